@@ -43,7 +43,7 @@ fn keys(schema: &Value, into: &mut BTreeSet<String>) {
 fn the_reference_covers_every_key() {
     let page = std::fs::read_to_string(file("docs/reference.md")).unwrap();
     let mut count = 0;
-    for kind in Kind::ALL {
+    for kind in Kind::all() {
         let part =
             page.split("\n## ").find(|p| p.starts_with(&format!("{}\n", kind.name()))).unwrap_or_default();
         let mut all = BTreeSet::new();

@@ -11,7 +11,7 @@ mod verify;
 pub use models::rig_file::CertificateKind as Kind;
 pub use verify::{Circumstances, Refusal, Verified};
 
-use nalgebra::DMatrix;
+use nalgebra::{DMatrix, DVector};
 use serde::{Deserialize, Serialize};
 use sha2::{Digest, Sha256};
 use std::collections::BTreeMap;
@@ -129,14 +129,15 @@ pub struct BudgetLine {
 }
 
 impl BudgetLine {
-    /// A line of that source.
-    pub fn new(
-        source: impl Into<String>,
-        evaluation: Evaluation,
-        standard_uncertainty: f64,
-        unit: &str,
-    ) -> Self {
-        BudgetLine { source: source.into(), evaluation, standard_uncertainty, unit: unit.into() }
+    /// What the statistics of the readings say.
+    pub fn a(source: impl Into<String>, standard_uncertainty: f64, unit: &str) -> Self {
+        let (source, unit) = (source.into(), unit.into());
+        BudgetLine { source, evaluation: Evaluation::A, standard_uncertainty, unit }
+    }
+
+    /// What is known by any other means.
+    pub fn b(source: impl Into<String>, standard_uncertainty: f64, unit: &str) -> Self {
+        BudgetLine { evaluation: Evaluation::B, ..Self::a(source, standard_uncertainty, unit) }
     }
 }
 
@@ -330,30 +331,51 @@ impl Certificate {
     }
 }
 
-/// Parameters with their 95 % intervals from estimates, covariance and degrees of freedom.
-pub fn parameters(
-    names_and_units: &[(String, &str)],
-    estimates: &[f64],
-    covariance: &DMatrix<f64>,
-    degrees_of_freedom: &[f64],
-) -> Vec<Parameter> {
-    names_and_units
-        .iter()
-        .zip(estimates)
-        .enumerate()
-        .map(|(i, ((name, unit), &value))| {
-            let u = covariance[(i, i)].max(0.0).sqrt();
-            let half = u * crate::uncertainty::student::coverage_factor(0.95, degrees_of_freedom[i]);
-            Parameter {
-                name: name.clone(),
-                value,
-                unit: (*unit).into(),
-                standard_uncertainty: u,
-                degrees_of_freedom: degrees_of_freedom[i],
-                ci95: [value - half, value + half],
-            }
-        })
-        .collect()
+/// What a calibration found of one parameter.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Finding {
+    /// Name of the parameter.
+    pub name: String,
+    /// Unit of the value.
+    pub unit: String,
+    /// Value and standard uncertainty.
+    pub estimate: [f64; 2],
+    /// Degrees of freedom of the uncertainty.
+    pub degrees_of_freedom: f64,
+}
+
+impl Finding {
+    /// A finding.
+    pub fn new(name: impl Into<String>, unit: impl Into<String>, estimate: [f64; 2], dof: f64) -> Self {
+        Finding { name: name.into(), unit: unit.into(), estimate, degrees_of_freedom: dof }
+    }
+
+    /// Covariance of findings that were determined apart, but for these blocks, each from its first finding on.
+    pub fn covariance(findings: &[Finding], blocks: &[(usize, DMatrix<f64>)]) -> DMatrix<f64> {
+        let variances = findings.iter().map(|f| f.estimate[1].powi(2));
+        let mut whole = DMatrix::from_diagonal(&DVector::from_iterator(findings.len(), variances));
+        for (at, block) in blocks {
+            whole.view_mut((*at, *at), block.shape()).copy_from(block);
+        }
+        whole
+    }
+}
+
+/// Parameters with their 95 % intervals; their uncertainties are those of the covariance.
+pub fn parameters(findings: &[Finding], covariance: &DMatrix<f64>) -> Vec<Parameter> {
+    let one = |(i, f): (usize, &Finding)| {
+        let (value, u) = (f.estimate[0], covariance[(i, i)].max(0.0).sqrt());
+        let half = u * crate::uncertainty::student::coverage_factor(0.95, f.degrees_of_freedom);
+        Parameter {
+            name: f.name.clone(),
+            value,
+            unit: f.unit.clone(),
+            standard_uncertainty: u,
+            degrees_of_freedom: f.degrees_of_freedom,
+            ci95: [value - half, value + half],
+        }
+    };
+    findings.iter().enumerate().map(one).collect()
 }
 
 /// A matrix as the rows that a certificate holds.

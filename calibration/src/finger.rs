@@ -7,13 +7,11 @@ pub mod friction;
 pub mod springs;
 pub mod stiffness;
 
-use crate::amplitude::apply::block_diagonal;
-use crate::certificate::{BudgetLine, Evaluation, Kind, Outcome, Residuals, parameters};
+use crate::certificate::{BudgetLine, Finding, Kind, Outcome, Residuals, parameters};
 use crate::identify::Identified;
 use crate::identify::skin::{IdentifiedSkin, Profile};
 use crate::regression::FitError;
 use friction::FrictionFit;
-use nalgebra::DMatrix;
 use springs::Springs;
 use std::collections::BTreeMap;
 use stiffness::Stiffness;
@@ -66,80 +64,54 @@ pub struct FingerFit {
 impl FingerFit {
     /// Everything that the certificate states.
     pub fn outcome(&self) -> Outcome {
-        let mut names: Vec<(String, &str)> = Vec::new();
-        let (mut values, mut dofs, mut blocks) = (Vec::new(), Vec::new(), Vec::new());
+        let (mut findings, mut blocks) = (Vec::new(), Vec::new());
+        // Intervals that are not value +- k u: where each begins at the earliest, or the whole of it.
+        let mut ends = Vec::new();
         let mut range = BTreeMap::new();
         let mut budget = Vec::new();
         let mut count = 0;
         let (mut sd, mut largest, mut unit) = (0.0, 0.0, String::new());
         for (name, s) in &self.stiffness {
-            names.push((format!("{name}.stiffness"), "N/m"));
-            values.push(s.value_n_per_m[0]);
-            dofs.push(s.degrees_of_freedom);
-            blocks.push(DMatrix::from_element(1, 1, s.value_n_per_m[1].powi(2)));
-            names.push((format!("{name}.loss_tangent"), "1"));
-            values.push(s.loss_tangent[0]);
-            dofs.push(s.degrees_of_freedom);
-            blocks.push(DMatrix::from_element(1, 1, s.loss_tangent[1].powi(2)));
-            budget.push(BudgetLine::new(
-                format!("{name}: force and displacement calibration"),
-                Evaluation::B,
-                s.scale_relative_sd,
-                "1",
-            ));
+            let dof = s.degrees_of_freedom;
+            findings.push(Finding::new(format!("{name}.stiffness"), "N/m", s.value_n_per_m, dof));
+            findings.push(Finding::new(format!("{name}.loss_tangent"), "1", s.loss_tangent, dof));
+            ends.extend([Ends::AtLeast(0.0); 2]);
+            let source = format!("{name}: force and displacement calibration");
+            budget.push(BudgetLine::b(source, s.scale_relative_sd, "1"));
             range.insert(format!("{name}.displacement_m"), s.range_m);
             count += s.points as u64;
             (sd, largest, unit) = (s.residual_sd_n, s.largest_residual_n, "N".into());
         }
         let mut remarks = Vec::new();
-        // Intervals that are not value +- k u: where each begins at the earliest, or the whole of it.
-        let mut ends: Vec<Ends> = vec![Ends::AtLeast(0.0); names.len()];
         if let Some(f) = &self.friction {
-            for (i, (name, u)) in f.names().into_iter().enumerate() {
+            blocks.push((findings.len(), f.fit.covariance.clone()));
+            for (i, (name, unit)) in f.names().into_iter().enumerate() {
                 // mu0 (1 + growth) is the coefficient of friction in the end: it cannot be negative.
                 ends.push(if name.ends_with(".growth") { Ends::AtLeast(-1.0) } else { Ends::Free });
-                names.push((name, u));
-                values.push(f.fit.estimates[i]);
-                dofs.push(f.fit.degrees_of_freedom);
+                let estimate = [f.fit.estimates[i], f.fit.standard_uncertainty(i)];
+                findings.push(Finding::new(name, unit, estimate, f.fit.degrees_of_freedom));
             }
-            blocks.push(f.fit.covariance.clone());
             count += f.fit.residuals.len() as u64;
             (sd, largest, unit) = (f.fit.residual_sd(), f.fit.residuals.amax(), "1 (of ln mu0)".into());
             range.extend(f.range());
             remarks.extend(f.remarks());
         }
         if let Some(s) = &self.springs {
+            let normal = (s.normal_stiffness_n_per_m, s.normal_ci95_n_per_m, s.normal_closed);
+            let ratio = (s.lateral_over_normal, s.ratio_ci95, s.ratio_closed);
             let fits = [
-                (
-                    "sweep.normal_stiffness",
-                    "N/m",
-                    s.normal_stiffness_n_per_m,
-                    s.normal_ci95_n_per_m,
-                    s.normal_closed,
-                ),
-                (
-                    "sweep.lateral_over_normal_stiffness",
-                    "1",
-                    s.lateral_over_normal,
-                    s.ratio_ci95,
-                    s.ratio_closed,
-                ),
+                ("sweep.normal_stiffness", "N/m", normal),
+                ("sweep.lateral_over_normal_stiffness", "1", ratio),
             ];
-            for (name, unit, value, ci95, closed) in fits {
+            for (name, unit, (value, ci95, closed)) in fits {
                 if closed == [true; 2] {
-                    names.push((name.into(), unit));
-                    values.push(value);
-                    dofs.push((s.passes as f64 - 3.0).max(1.0));
+                    let dof = (s.passes as f64 - 3.0).max(1.0);
+                    findings.push(Finding::new(name, unit, [value, half_width_sd(ci95)], dof));
                     ends.push(Ends::Both(ci95));
-                    let sd = 0.5 * (ci95[1] - ci95[0]) / 1.96;
-                    blocks.push(DMatrix::from_element(1, 1, sd * sd));
                 } else {
+                    let [low, high] = [0, 1].map(|i| end(ci95[i], closed[i]));
                     remarks.push(format!(
-                        "{name}: {value:.3e} {unit}, but the passes leave its interval open: {:.3e}{} to {:.3e}{}",
-                        ci95[0],
-                        if closed[0] { "" } else { " (end of the range searched)" },
-                        ci95[1],
-                        if closed[1] { "" } else { " (end of the range searched)" }
+                        "{name}: {value:.3e} {unit}, but the passes leave its interval open: {low} to {high}"
                     ));
                 }
             }
@@ -159,20 +131,16 @@ impl FingerFit {
         if let Some(m) = &self.modulus {
             let fit = ModulusFit::of(m, self.skin.as_ref());
             for (name, unit, value, ci95) in fit.parameters {
-                names.push((name.into(), unit));
-                values.push(value);
-                dofs.push((m.points as f64 - 1.0).max(1.0));
-                // A profile interval is not symmetric; the certificate's standard uncertainty is its half-width.
+                let dof = (m.points as f64 - 1.0).max(1.0);
+                findings.push(Finding::new(name, unit, [value, half_width_sd(ci95)], dof));
                 ends.push(Ends::Both(ci95));
-                let sd = 0.5 * (ci95[1] - ci95[0]) / 1.96;
-                blocks.push(DMatrix::from_element(1, 1, sd * sd));
             }
             count += m.points as u64;
             (sd, largest, unit) = (m.residual_deg[0], m.residual_deg[1], "deg".into());
             remarks.extend(fit.remarks);
         }
-        let covariance = block_diagonal(&blocks);
-        let parameters: Vec<_> = parameters(&names, &values, &covariance, &dofs)
+        let covariance = Finding::covariance(&findings, &blocks);
+        let parameters: Vec<_> = parameters(&findings, &covariance)
             .into_iter()
             .zip(&ends)
             .map(|(parameter, ends)| match ends {
@@ -222,6 +190,16 @@ enum Ends {
     Both([f64; 2]),
 }
 
+/// An end of a profile interval, in words.
+fn end(value: f64, closed: bool) -> String {
+    format!("{value:.3e}{}", if closed { "" } else { " (end of the range searched)" })
+}
+
+/// A profile interval is not symmetric; the certificate's standard uncertainty is that of its half-width.
+fn half_width_sd(ci95: [f64; 2]) -> f64 {
+    0.5 * (ci95[1] - ci95[0]) / 1.96
+}
+
 /// What the certificate says of the inverse analysis.
 struct ModulusFit {
     /// Name, unit, value, 95 % interval.
@@ -257,21 +235,12 @@ impl ModulusFit {
                 ("retardation time", " s", "stratum_corneum.retardation_time", &skin.retardation_time_s),
             ];
             for (quantity, unit, parameter, profile) in quantities {
-                let end = |closed: bool, value: f64| {
-                    if closed {
-                        format!("{value:.3e}")
-                    } else {
-                        format!("{value:.3e} (end of the range searched)")
-                    }
-                };
-                let remark = format!(
-                    "all three free: {quantity} {:.3e}{unit}, 95 % profile interval {} to {}{unit}{}",
+                let [low, high] = [0, 1].map(|i| end(profile.ci95[i], profile.closed[i]));
+                remarks.push(format!(
+                    "all three free: {quantity} {:.3e}{unit}, 95 % profile interval {low} to {high}{unit}{}",
                     profile.best,
-                    end(profile.closed[0], profile.ci95[0]),
-                    end(profile.closed[1], profile.ci95[1]),
                     if profile.gaps { ", with gaps" } else { "" }
-                );
-                remarks.push(remark);
+                ));
                 if !parameter.is_empty() && profile.closed == [true; 2] && !profile.gaps {
                     let unit = if unit.is_empty() { "1" } else { "s" };
                     parameters.push((parameter, unit, profile.best, profile.ci95));

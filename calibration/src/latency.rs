@@ -5,9 +5,8 @@
 
 pub mod clock;
 
-use crate::certificate::{BudgetLine, Evaluation, Kind, Outcome, Residuals, parameters};
+use crate::certificate::{BudgetLine, Finding, Kind, Outcome, Residuals, parameters};
 use crate::uncertainty::Input;
-use nalgebra::DMatrix;
 use statrs::distribution::{ChiSquared, ContinuousCDF};
 use std::collections::BTreeMap;
 
@@ -82,34 +81,23 @@ pub fn channel_delay(
 
 /// Everything that a latency certificate states: delays of the channels, and clocks where they were compared.
 pub fn outcome(channels: &[ChannelDelay], clocks: &[(String, clock::ClockFit)]) -> Outcome {
-    let mut names = Vec::new();
-    let (mut values, mut uncertainties, mut dofs) = (Vec::new(), Vec::new(), Vec::new());
+    let mut findings = Vec::new();
     let mut budget = Vec::new();
     for c in channels {
-        names.push((format!("{}.delay", c.channel), "s"));
-        values.push(c.delay.value);
-        uncertainties.push(c.delay.standard_uncertainty);
-        dofs.push(c.delay.degrees_of_freedom);
-        names.push((format!("{}.jitter", c.channel), "s"));
-        values.push(c.jitter_s);
+        let (delay, edges) = (&c.delay, c.edges as f64);
+        let estimate = [delay.value, delay.standard_uncertainty];
+        findings.push(Finding::new(format!("{}.delay", c.channel), "s", estimate, delay.degrees_of_freedom));
         // The standard uncertainty of a standard deviation of n Gaussian values (GUM E.4.3).
-        uncertainties.push(c.jitter_s / (2.0 * (c.edges as f64 - 1.0)).sqrt());
-        dofs.push(c.edges as f64 - 1.0);
-        budget.push(BudgetLine::new(
-            format!("scatter of {} edges of {}", c.edges, c.channel),
-            Evaluation::A,
-            c.jitter_s / (c.edges as f64).sqrt(),
-            "s",
-        ));
+        let estimate = [c.jitter_s, c.jitter_s / (2.0 * (edges - 1.0)).sqrt()];
+        findings.push(Finding::new(format!("{}.jitter", c.channel), "s", estimate, edges - 1.0));
+        let scatter = format!("scatter of {edges} edges of {}", c.channel);
+        budget.push(BudgetLine::a(scatter, c.jitter_s / edges.sqrt(), "s"));
     }
     for (channel, clock) in clocks {
-        names.push((format!("{channel}.clock_rate_error"), "1"));
-        values.push(clock.rate_error[0]);
-        uncertainties.push(clock.rate_error[1]);
-        dofs.push(clock.degrees_of_freedom);
+        let name = format!("{channel}.clock_rate_error");
+        findings.push(Finding::new(name, "1", clock.rate_error, clock.degrees_of_freedom));
     }
-    let covariance =
-        DMatrix::from_diagonal(&nalgebra::DVector::from_vec(uncertainties.iter().map(|u| u * u).collect()));
+    let covariance = Finding::covariance(&findings, &[]);
     let jitter = channels.iter().map(|c| c.jitter_s).fold(0.0, f64::max);
     let largest = channels.iter().map(|c| (c.range_s[1] - c.delay.value).max(c.delay.value - c.range_s[0]));
     Outcome {
@@ -126,7 +114,7 @@ pub fn outcome(channels: &[ChannelDelay], clocks: &[(String, clock::ClockFit)]) 
                 )
             })
             .collect(),
-        parameters: parameters(&names, &values, &covariance, &dofs),
+        parameters: parameters(&findings, &covariance),
         covariance,
         residuals: Residuals {
             count: channels.iter().map(|c| c.edges as u64).sum(),

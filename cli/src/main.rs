@@ -10,9 +10,10 @@ mod verbs;
 
 use clap::error::ErrorKind;
 use clap::{CommandFactory, FromArgMatches, Parser, Subcommand};
-use runs::print::Remarks;
+use runs::print::{Remarks, answer_json};
 use runs::version;
 use runs::{out, say};
+use serde_json::json;
 use std::io::IsTerminal;
 use std::process::ExitCode;
 use tracing_subscriber::filter::Targets;
@@ -107,7 +108,6 @@ fn parsed(arguments: impl IntoIterator<Item = std::ffi::OsString>) -> Result<Cli
     Cli::from_arg_matches(&command().try_get_matches_from(arguments)?)
 }
 
-/// The features of this build.
 fn features() -> Vec<&'static str> {
     let all = [
         ("arrow", cfg!(feature = "arrow")),
@@ -125,7 +125,7 @@ fn features() -> Vec<&'static str> {
 fn say_version() -> ExitCode {
     let has = |flag: &str| std::env::args().any(|a| a == flag);
     if has("--json") {
-        out!("{}", serde_json::json!(version::of_this_program(features())));
+        answer_json(&json!(version::of_this_program(features())));
     } else if has("--version") {
         out!("{}", version::of_this_program(features()).words());
     } else {
@@ -150,9 +150,8 @@ fn main() -> ExitCode {
             }
             if error.use_stderr() && std::env::args().any(|a| a == "--json") {
                 let message = cli::plain(&error.to_string());
-                out!(
-                    "{}",
-                    serde_json::json!({ "error": message.lines().next().unwrap_or_default(), "status": cli::REFUSED })
+                answer_json(
+                    &json!({ "error": message.lines().next().unwrap_or_default(), "status": cli::REFUSED }),
                 );
             }
             let message = error.render().to_string();
@@ -229,12 +228,9 @@ fn run(verb: Verb, json: bool) -> ExitCode {
                 let causes: Vec<String> =
                     report.chain().skip(1).map(|c| cli::plain(&c.to_string())).collect();
                 let help = report.help().map(|h| h.to_string());
-                out!(
-                    "{}",
-                    serde_json::json!({
-                        "error": cli::plain(&report.to_string()), "causes": causes, "help": help, "status": status
-                    })
-                );
+                answer_json(&json!({
+                    "error": cli::plain(&report.to_string()), "causes": causes, "help": help, "status": status
+                }));
             }
             say!("{}", cli::plain(&format!("{report:?}")));
             ExitCode::from(status)

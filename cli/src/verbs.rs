@@ -40,8 +40,10 @@ pub mod watch;
 /// What nearly every verb needs.
 mod prelude {
     pub use super::{DONE, FAILED, REFUSED, exit};
+    pub use ::runs::print::answer_json;
     pub use ::runs::{out, say};
     pub use miette::{IntoDiagnostic, WrapErr};
+    pub use serde_json::json;
     pub use std::path::{Path, PathBuf};
     pub use std::process::ExitCode;
 }

@@ -11,9 +11,6 @@ pub struct KernelCan(Infallible);
 
 impl KernelCan {
     /// Refuses.
-    ///
-    /// # Errors
-    /// Always.
     pub fn open(interface: &str) -> io::Result<Self> {
         Err(io::Error::other(format!(
             "{interface}: this muprime was built without SocketCAN (feature `can`, Linux alone); use a serial adapter (slcan)"

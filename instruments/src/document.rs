@@ -72,7 +72,6 @@ fn severity(severity: Severity) -> &'static str {
     }
 }
 
-/// A table, where it has rows.
 fn table(page: &mut String, heads: &str, rows: impl Iterator<Item = Vec<String>>) {
     for (at, row) in rows.enumerate() {
         if at == 0 {

@@ -158,7 +158,6 @@ pub struct LawTableError {
     pub remedy: String,
 }
 
-/// One axis of the grid.
 #[derive(Clone, Debug)]
 struct Axis {
     variable: &'static Variable,
@@ -178,7 +177,6 @@ fn bad(line: u64, problem: impl Into<String>, remedy: impl Into<String>) -> LawT
     LawTableError { line, problem: problem.into(), remedy: remedy.into() }
 }
 
-/// Where a column goes.
 enum Column {
     Variable(&'static Variable),
     Answer(usize),

@@ -46,7 +46,6 @@ fn models_json() -> PyResult<String> {
     serde_json::to_string(&::runs::version::models()).map_err(|why| MuprimeError::new_err(why.to_string()))
 }
 
-/// The module.
 #[pymodule]
 fn _muprime(m: &Bound<'_, PyModule>) -> PyResult<()> {
     m.add("__version__", env!("CARGO_PKG_VERSION"))?;

@@ -96,7 +96,6 @@ pub struct LoopParts {
     pub held: Option<Participant>,
 }
 
-/// The grid of deadlines.
 #[derive(Clone, Copy, Debug)]
 struct Grid {
     period: u64,

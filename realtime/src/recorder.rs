@@ -2,7 +2,7 @@
 //!
 //! What a reader must know comes first (metadata and attachments), so that a file cut at any byte still tells
 //! what it is. Chunks are closed at every [`Recorder::flush`]; a kill loses at most what came after the last
-//! one. Time stamps are the wall clock at the start plus loop time, which is monotonic.
+//! one. Time stamps are the wall clock at the start plus loop time, which is monotonic. Errors of the writer are those of its file.
 //!
 //! Every byte is under a checksum: a chunk's messages under the chunk's, an attachment under its own, a metadata record under
 //! one that stands among its facts ([`CHECKSUM`]), and all of the data and all of the index under those that the format puts at
@@ -73,9 +73,6 @@ pub struct Recorder<W> {
 
 impl<W: Write> Recorder<W> {
     /// Begins a record at the beginning of an empty file, and writes its preamble.
-    ///
-    /// # Errors
-    /// Whatever the file says.
     pub fn begin(to: W, preamble: Preamble) -> Result<Self, McapError> {
         let mut sink = Sink::begin(to)?;
         sink.facts(HEADER, preamble.facts.clone())?;
@@ -94,33 +91,21 @@ impl<W: Write> Recorder<W> {
     }
 
     /// Writes a row.
-    ///
-    /// # Errors
-    /// Whatever the file says.
     pub fn row(&mut self, row: &Row) -> Result<(), McapError> {
         self.message(0, row.now, row)
     }
 
     /// Writes a pass.
-    ///
-    /// # Errors
-    /// Whatever the file says.
     pub fn pass(&mut self, at: Nanos, pass: &impl Serialize) -> Result<(), McapError> {
         self.message(1, at, pass)
     }
 
     /// Writes an event.
-    ///
-    /// # Errors
-    /// Whatever the file says.
     pub fn event(&mut self, at: Nanos, event: &impl Serialize) -> Result<(), McapError> {
         self.message(2, at, event)
     }
 
     /// Closes the present chunk and hands everything to the file.
-    ///
-    /// # Errors
-    /// Whatever the file says.
     pub fn flush(&mut self) -> Result<(), McapError> {
         self.sink.flush()
     }
@@ -129,9 +114,6 @@ impl<W: Write> Recorder<W> {
 impl<W: Read + Write + Seek> Recorder<W> {
     /// Repeats the preamble's facts with `last` words and the counts of messages, and ends the file so that
     /// any reader opens it.
-    ///
-    /// # Errors
-    /// Whatever the file says.
     pub fn end(mut self, last: BTreeMap<String, String>) -> Result<(), McapError> {
         let mut facts = self.preamble.facts.clone();
         facts.extend(last);

@@ -75,7 +75,6 @@ pub struct Look {
     pub stalls: StallReport,
 }
 
-/// The channels that are followed.
 #[derive(Default)]
 struct Followed {
     lateral: Follow,

@@ -30,7 +30,6 @@ use std::sync::mpsc::{RecvTimeoutError, Sender, channel};
 use std::thread::JoinHandle;
 use std::time::Duration;
 
-/// The folder of the ledgers.
 const FOLDER: &str = "/var/tmp";
 /// How far an entry is ahead of what was driven: what a program that is killed is charged too much.
 pub const AHEAD: Duration = Duration::from_secs(4);
@@ -38,7 +37,6 @@ pub const AHEAD: Duration = Duration::from_secs(4);
 const WRITE_EVERY: Duration = Duration::from_secs(1);
 /// An entry that is older than this does not cover what is driven until the next one any more.
 const HOLDS_FOR: Duration = Duration::from_secs(3);
-/// Bytes of a place.
 const PLACE: usize = 8192;
 
 /// What a place holds.

@@ -58,7 +58,6 @@ pub enum Keys {
     None(String),
 }
 
-/// What was seen so far.
 #[derive(Debug)]
 struct Seen {
     view: View,

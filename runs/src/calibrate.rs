@@ -307,7 +307,6 @@ impl Common {
         })
     }
 
-    /// Makes the certificate.
     fn certify(&self, outcome: Outcome, raw: RawData) -> miette::Result<Issued> {
         self.certify_with(outcome, raw, [])
     }

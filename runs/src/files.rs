@@ -1,6 +1,6 @@
 //! Files that outlive a power cut: written beside their place, synced, moved there, and their folder synced,
 //! because a name too is only safe once its folder is (POSIX `fsync`; ext4, XFS and Btrfs give more, none
-//! promises it).
+//! promises it). Errors are those of the file system, where no others are stated.
 
 use miette::{Context, IntoDiagnostic};
 use std::fs::{self, File, OpenOptions};
@@ -34,9 +34,6 @@ pub fn open_plain(path: &Path, options: &mut OpenOptions) -> io::Result<File> {
 
 /// Makes a new file, to be written beside its place. What an earlier program left under that name, or somebody planted there, loses the
 /// name and is not touched.
-///
-/// # Errors
-/// Whatever the file system says.
 pub fn fresh(path: &Path) -> io::Result<File> {
     let new = || open_plain(path, OpenOptions::new().create_new(true).read(true).write(true));
     match new() {
@@ -51,9 +48,6 @@ fn folder_of(path: &Path) -> &Path {
 }
 
 /// Makes the names in the folder of `path` safe.
-///
-/// # Errors
-/// Whatever the file system says.
 pub fn sync_folder_of(path: &Path) -> io::Result<()> {
     File::open(folder_of(path))?.sync_all()
 }

@@ -37,6 +37,11 @@ pub fn answer(text: &str) {
     put(OUT, Piece::Text(format!("{text}\n")), false);
 }
 
+/// Writes a document to standard output: its JSON on one line.
+pub fn answer_json(value: &(impl serde::Serialize + ?Sized)) {
+    answer(&serde_json::to_string(value).expect("the keys of a document are texts"));
+}
+
 /// Writes a line to standard error: the form behind [`say!`].
 pub fn remark(text: &str) {
     question(&format!("{text}\n"));

@@ -1,6 +1,5 @@
 //! Quantities on the command line: `2um`, `27.5kHz`, `20mm/s`, `500mN`, or the bare number in SI.
 
-/// Prefixes of a unit.
 const PREFIXES: [(&str, i32); 9] =
     [("", 0), ("n", -9), ("u", -6), ("\u{b5}", -6), ("\u{3bc}", -6), ("m", -3), ("k", 3), ("M", 6), ("G", 9)];
 

@@ -1,6 +1,7 @@
 //! A run's folder: the record, the point table, rig.toml, the report; and how a killed run is taken up again.
 //!
-//! A pass is acknowledged (on stdout) only after its line is in `points.csv` and synced.
+//! A pass is acknowledged (on stdout) only after its line is in `points.csv` and synced. Errors are
+//! those of the file system, where no others are stated.
 
 mod damage;
 mod lines;
@@ -210,9 +211,6 @@ impl RunDir {
     }
 
     /// Begins the session that was planned: from here on the folder stays, whatever comes.
-    ///
-    /// # Errors
-    /// Whatever the file system says.
     pub fn begin(&mut self) -> miette::Result<()> {
         self.sessions.extend(self.planned.take());
         let mut text = Vec::new();
@@ -249,9 +247,6 @@ impl RunDir {
     }
 
     /// The record file of the session that has begun.
-    ///
-    /// # Errors
-    /// Whatever the file system says.
     pub fn new_record(&self) -> miette::Result<Placed> {
         let number = self.sessions.last().map_or(1, |s| s.session);
         let path = self.path.join(format!("run-{number}.mcap"));
@@ -285,18 +280,12 @@ impl RunDir {
     }
 
     /// Writes a file of the run whole or not at all.
-    ///
-    /// # Errors
-    /// Whatever the file system says.
     pub fn write(&self, name: &str, bytes: &[u8]) -> miette::Result<()> {
         write_plain(&self.path.join(name), bytes)
     }
 }
 
 /// The record files of a run's folder, oldest first.
-///
-/// # Errors
-/// Whatever the file system says.
 pub fn records_in(path: &Path) -> miette::Result<Vec<PathBuf>> {
     let mut found: Vec<PathBuf> = fs::read_dir(path)
         .into_diagnostic()

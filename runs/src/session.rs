@@ -211,9 +211,6 @@ impl Begun {
     }
 
     /// The summary of a run that is complete: nothing is driven.
-    ///
-    /// # Errors
-    /// Whatever the file system says.
     pub fn finish(self, job: &Job) -> miette::Result<Summary> {
         Keeper::finish(job, self.dir, self.planned, self.sequence.agreement(true))
     }

@@ -5,7 +5,7 @@
 //! the sensor. Its formulae are this world's own. Where a library effect bears the same name, the cause is
 //! the same and the formula another.
 //!
-//! To add one: a file in this folder with a `KIND`, and its line in the list below.
+//! To add one: a file in this folder with a `KIND`, and its name in the list below.
 
 mod file;
 
@@ -123,10 +123,10 @@ pub struct Kind {
 
 impl Kind {
     /// A cause that a table of steady passes shows and the library has an effect for.
-    const fn cause(name: &'static str, place: Place, summary: &'static str) -> Self {
+    const fn cause(place: Place, summary: &'static str) -> Self {
         let act = Act::Setup(|_, _| {});
         Kind {
-            name,
+            name: "",
             place,
             in_library: true,
             in_tables: true,
@@ -138,8 +138,8 @@ impl Kind {
     }
 
     /// A fault of the rig, which is none of the causes that a table shows.
-    const fn fault(name: &'static str, place: Place, summary: &'static str) -> Self {
-        Kind { in_library: false, in_tables: false, ..Self::cause(name, place, summary) }
+    const fn fault(place: Place, summary: &'static str) -> Self {
+        Kind { in_library: false, in_tables: false, ..Self::cause(place, summary) }
     }
 
     /// The kind of a name.
@@ -294,53 +294,21 @@ impl Defects {
     }
 }
 
-/// Declares the rooms of this folder and lists their kinds.
+/// Declares the files of this folder and lists their kinds, each with its file's name.
 macro_rules! kinds {
-    ($($room:ident)*) => {
-        $(mod $room;)*
+    ($($file:ident)*) => {
+        $(mod $file;)*
         /// Every kind of defect.
-        pub static ALL: &[&Kind] = &[$(&$room::KIND),*];
+        pub static ALL: &[&Kind] = &[$(&Kind { name: stringify!($file), ..$file::KIND }),*];
     };
 }
 
 kinds! {
-    amplifier_refuses_off
-    amplifier_without_watchdog
-    adhesion
-    amplitude_droop
-    amplitude_miscalibration
-    amplitude_saturation
-    chamber_stuck
-    chamber_vents
-    contact_ageing
-    contaminated_patch
-    force_crosstalk
-    frictional_heating
-    in_plane_motion
-    lateral_gain
-    lateral_offset_drift
-    lateral_recovery
-    lateral_resonance
-    load_dependent_friction
-    mains_modulation
-    mode_shape
-    moisture_drift
-    multi_asperity
-    normal_damping
-    normal_offset
-    plate_tilt
-    rate_dependent_friction
-    resonance_detuning
-    ridge_anisotropy
-    ridge_inertia
-    second_harmonic
-    sensor_lag
-    speed_error
-    speed_ripple
-    squeeze_film
-    stage_stall
-    stiffness_error
-    subsurface_relaxation
-    time_misalignment
-    triboelectric_attraction
+    amplifier_refuses_off amplifier_without_watchdog adhesion amplitude_droop amplitude_miscalibration
+    amplitude_saturation chamber_stuck chamber_vents contact_ageing contaminated_patch force_crosstalk
+    frictional_heating in_plane_motion lateral_gain lateral_offset_drift lateral_recovery
+    lateral_resonance load_dependent_friction mains_modulation mode_shape moisture_drift multi_asperity
+    normal_damping normal_offset plate_tilt rate_dependent_friction resonance_detuning ridge_anisotropy
+    ridge_inertia second_harmonic sensor_lag speed_error speed_ripple squeeze_film stage_stall
+    stiffness_error subsurface_relaxation time_misalignment triboelectric_attraction
 }

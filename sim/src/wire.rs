@@ -56,7 +56,6 @@ impl Service {
         Ok(Service { stop, thread: Some(thread) })
     }
 
-    /// Ends it, and waits for that.
     fn end(&mut self) {
         self.stop.store(true, Ordering::Release);
         if let Some(thread) = self.thread.take() {

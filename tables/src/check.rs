@@ -108,10 +108,9 @@ fn read_json(name: &str) -> miette::Result<serde_json::Value> {
     })
 }
 
-/// The schema of a kind of TOML file.
 fn schema_of(kind: &str) -> Option<Kind> {
     let name = if kind == "rig.toml" { "rig" } else { kind };
-    Kind::ALL.into_iter().find(|k| k.name() == name && !matches!(k, Kind::Table | Kind::Verdict))
+    Kind::all().find(|k| k.name() == name && !matches!(k, Kind::Table | Kind::Verdict))
 }
 
 /// Whether a file holds, and its kind.

@@ -18,29 +18,21 @@ mod parquet;
 pub mod topics;
 pub mod unit;
 
-/// Stands in where the feature is off: every call says how to get it.
-#[cfg(not(feature = "arrow"))]
-mod arrow {
-    pub fn bytes(_: &super::columns::Table, _: &super::facts::Facts) -> miette::Result<Vec<u8>> {
-        Err(crate::built_without("arrow", "take CSV"))
-    }
+/// Stands in for a format where its feature is off: every call says how to get it.
+macro_rules! left_out {
+    ($format:ident without $feature:literal) => {
+        #[cfg(not(feature = $feature))]
+        mod $format {
+            pub fn bytes(_: &super::columns::Table, _: &super::facts::Facts) -> miette::Result<Vec<u8>> {
+                Err(crate::built_without($feature, "take CSV"))
+            }
+        }
+    };
 }
 
-/// Stands in where the feature is off: every call says how to get it.
-#[cfg(not(feature = "matlab"))]
-mod hdf5 {
-    pub fn bytes(_: &super::columns::Table, _: &super::facts::Facts) -> miette::Result<Vec<u8>> {
-        Err(crate::built_without("matlab", "take CSV"))
-    }
-}
-
-/// Stands in where the feature is off: every call says how to get it.
-#[cfg(not(feature = "parquet"))]
-mod parquet {
-    pub fn bytes(_: &super::columns::Table, _: &super::facts::Facts) -> miette::Result<Vec<u8>> {
-        Err(crate::built_without("parquet", "take CSV"))
-    }
-}
+left_out!(arrow without "arrow");
+left_out!(hdf5 without "matlab");
+left_out!(parquet without "parquet");
 
 use clap::ValueEnum;
 use runs::report::RunData;

@@ -41,9 +41,6 @@ pub use text::Marks;
 #[cfg(not(feature = "matlab"))]
 mod mat {
     /// Refuses.
-    ///
-    /// # Errors
-    /// Always.
     pub fn read(_: &[u8], _: Option<&str>, _: &[String]) -> miette::Result<super::Grid> {
         Err(crate::built_without("matlab", "take CSV"))
     }
@@ -55,9 +52,6 @@ use mat as hdf5;
 #[cfg(not(feature = "excel"))]
 mod workbook {
     /// Refuses.
-    ///
-    /// # Errors
-    /// Always.
     pub fn read(_: &[u8], _: Option<&str>) -> miette::Result<super::Grid> {
         Err(crate::built_without("excel", "save the sheet as CSV"))
     }

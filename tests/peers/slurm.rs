@@ -2,6 +2,7 @@
 
 use std::path::{Path, PathBuf};
 use std::process::Command;
+use std::sync::atomic::{AtomicU32, Ordering};
 use std::time::{Duration, Instant};
 use tests::study::{run, text};
 use tests::{file, texts};
@@ -10,11 +11,13 @@ use tests::{file, texts};
 pub struct Slurm(pub PathBuf);
 
 impl Slurm {
-    /// Starts it, with ports of this process.
+    /// Starts it, with ports of this process that no other Slurm of it has.
     pub fn start(folder: &Path) -> Slurm {
+        static STARTED: AtomicU32 = AtomicU32::new(0);
         let slurm = Slurm(folder.join("slurm"));
         std::fs::create_dir(&slurm.0).unwrap();
-        let port = 20_000 + std::process::id() % 20_000;
+        let number = 8 * std::process::id() + STARTED.fetch_add(1, Ordering::Relaxed);
+        let port = 20_000 + 2 * (number % 5_000);
         slurm.asked("start", &[&port.to_string()]);
         slurm
     }

@@ -4,12 +4,8 @@ use super::droop::{Droop, Exponent};
 use super::gain::GainFit;
 use super::map::ModeShape;
 use super::resonance::Resonance;
-use crate::certificate::{
-    BudgetLine, Evaluation, Kind, Outcome, Parameter, Refusal, Residuals, Verified, parameters,
-};
-use crate::uncertainty::student::coverage_factor;
+use crate::certificate::{BudgetLine, Finding, Kind, Outcome, Refusal, Residuals, Verified, parameters};
 use models::quantity::PeakToPeak;
-use nalgebra::DMatrix;
 use std::collections::BTreeMap;
 use std::f64::consts::PI;
 
@@ -37,24 +33,14 @@ impl AmplitudeFit {
     pub fn outcome(&self) -> Outcome {
         let gain = &self.gain;
         let covariance = &gain.fit.covariance + &gain.type_b;
-        let names = gain.form.names(&self.set_point_unit);
-        let named: Vec<(String, &str)> = names.iter().map(|(n, u)| (n.clone(), u.as_str())).collect();
-        let dof: Vec<f64> = (0..named.len())
-            .map(|i| gain.fit.degrees_of_freedom * (covariance[(i, i)] / gain.fit.covariance[(i, i)]).powi(2))
-            .collect();
-        let mut list: Vec<Parameter> = parameters(&named, gain.fit.estimates.as_slice(), &covariance, &dof);
-        let mut blocks = vec![covariance];
-        let mut single = |name: &str, unit: &str, [value, u]: [f64; 2], dof: f64| {
-            let half = u * coverage_factor(0.95, dof);
-            list.push(Parameter {
-                name: name.into(),
-                value,
-                unit: unit.into(),
-                standard_uncertainty: u,
-                degrees_of_freedom: dof,
-                ci95: [value - half, value + half],
-            });
+        let gained = |(i, (name, unit)): (usize, (String, String))| {
+            let dof =
+                gain.fit.degrees_of_freedom * (covariance[(i, i)] / gain.fit.covariance[(i, i)]).powi(2);
+            Finding::new(name, unit, [gain.fit.estimates[i], covariance[(i, i)].sqrt()], dof)
         };
+        let names = gain.form.names(&self.set_point_unit);
+        let mut findings: Vec<Finding> = names.into_iter().enumerate().map(gained).collect();
+        let mut blocks = vec![(0, covariance)];
         let mut remarks = Vec::new();
         let mut settings = BTreeMap::from([
             ("set_point_unit".into(), self.set_point_unit.clone()),
@@ -62,33 +48,31 @@ impl AmplitudeFit {
         ]);
         let mut range = BTreeMap::from([("set_point".into(), gain.range)]);
         if let Some(r) = &self.resonance {
-            single("resonance_hz", "Hz", r.frequency_hz, r.degrees_of_freedom);
-            single("quality_factor", "1", r.quality_factor, r.degrees_of_freedom);
-            blocks.push(DMatrix::from_diagonal_element(1, 1, r.frequency_hz[1].powi(2)));
-            blocks.push(DMatrix::from_diagonal_element(1, 1, r.quality_factor[1].powi(2)));
+            findings.push(Finding::new("resonance_hz", "Hz", r.frequency_hz, r.degrees_of_freedom));
+            findings.push(Finding::new("quality_factor", "1", r.quality_factor, r.degrees_of_freedom));
         } else {
             remarks.push("no sweep: resonance and quality factor were not determined".into());
         }
         if let Some(m) = &self.mode_shape {
             let dof = m.fit.degrees_of_freedom;
-            single("mode.antinode_at_m", "m", m.antinode_at_m, dof);
-            single("mode.wavelength_m", "m", m.wavelength_m, dof);
-            single("mode.standing_share", "1", m.standing_share, dof);
-            blocks.push(m.fit.covariance.view((1, 1), (3, 3)).into_owned());
+            blocks.push((findings.len(), m.fit.covariance.view((1, 1), (3, 3)).into_owned()));
+            findings.push(Finding::new("mode.antinode_at_m", "m", m.antinode_at_m, dof));
+            findings.push(Finding::new("mode.wavelength_m", "m", m.wavelength_m, dof));
+            findings.push(Finding::new("mode.standing_share", "1", m.standing_share, dof));
             range.insert("position_m".into(), m.range_m);
         } else {
             remarks.push("no map: the amplitude was measured at one place of the stroke only".into());
         }
         if let Some(d) = &self.droop {
             let unit = if d.exponent == Exponent::Hertz { "1/N^(2/3)" } else { "1/N" };
-            single("droop", unit, d.coefficient, d.fit.degrees_of_freedom);
-            blocks.push(DMatrix::from_diagonal_element(1, 1, d.coefficient[1].powi(2)));
+            findings.push(Finding::new("droop", unit, d.coefficient, d.fit.degrees_of_freedom));
             settings.insert("droop_exponent".into(), d.exponent.value().to_string());
             range.insert("normal_force_n".into(), [0.0, d.largest_n]);
         } else {
             remarks.push("no loads: the amplitude was measured without a finger only".into());
         }
         let sd = gain.fit.residual_sd();
+        let covariance = Finding::covariance(&findings, &blocks);
         Outcome {
             kind: Kind::Amplitude,
             model:
@@ -97,8 +81,8 @@ impl AmplitudeFit {
                     .into(),
             settings,
             remarks,
-            parameters: list,
-            covariance: block_diagonal(&blocks),
+            parameters: parameters(&findings, &covariance),
+            covariance,
             residuals: Residuals {
                 count: gain.fit.residuals.len() as u64,
                 sd,
@@ -109,33 +93,15 @@ impl AmplitudeFit {
             temperature_c: None,
             range,
             budget: vec![
-                BudgetLine::new(
-                    "vibrometer, common to all points",
-                    Evaluation::B,
-                    self.vibrometer_relative_sd,
-                    "1",
-                ),
-                BudgetLine::new(
+                BudgetLine::b("vibrometer, common to all points", self.vibrometer_relative_sd, "1"),
+                BudgetLine::a(
                     "repeatability of the gain",
-                    Evaluation::A,
                     gain.fit.standard_uncertainty(0) / gain.fit.estimates[0].abs(),
                     "1",
                 ),
             ],
         }
     }
-}
-
-/// Blocks along the diagonal: what was measured apart is independent.
-pub fn block_diagonal(blocks: &[DMatrix<f64>]) -> DMatrix<f64> {
-    let n = blocks.iter().map(|b| b.nrows()).sum();
-    let mut whole = DMatrix::zeros(n, n);
-    let mut at = 0;
-    for block in blocks {
-        whole.view_mut((at, at), block.shape()).copy_from(block);
-        at += block.nrows();
-    }
-    whole
 }
 
 /// The calibration in use, from a verified certificate only, without allocation.

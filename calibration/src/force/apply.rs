@@ -5,7 +5,7 @@ use super::series::Weighing;
 use super::zero::Zero;
 use super::{AXES, Axis};
 use crate::certificate::{
-    BudgetLine, Evaluation, Kind, Outcome, Parameter, Refusal, Residuals, Verified, parameters,
+    BudgetLine, Finding, Kind, Outcome, Parameter, Refusal, Residuals, Verified, parameters,
 };
 use nalgebra::{Matrix2, Vector2};
 use std::collections::BTreeMap;
@@ -16,12 +16,17 @@ const TEMPERATURE_REACH_K: f64 = 3.0;
 impl ForceFit {
     /// Everything that the certificate states.
     pub fn outcome(&self, weighing: &Weighing) -> Outcome {
-        let names: Vec<(String, &str)> =
-            AXES.iter().flat_map(|a| self.terms.iter().map(|t| t.name(*a))).collect();
         let covariance = self.covariance();
-        let estimates: Vec<f64> = self.estimates.iter().copied().collect();
-        let parameters: Vec<Parameter> =
-            parameters(&names, &estimates, &covariance, &self.effective_degrees_of_freedom());
+        let names = AXES.iter().flat_map(|a| self.terms.iter().map(|t| t.name(*a)));
+        let numbers = self.estimates.iter().zip(self.effective_degrees_of_freedom());
+        let findings: Vec<Finding> = names
+            .zip(numbers)
+            .enumerate()
+            .map(|(i, ((name, unit), (value, dof)))| {
+                Finding::new(name, unit, [*value, covariance[(i, i)].sqrt()], dof)
+            })
+            .collect();
+        let parameters = parameters(&findings, &covariance);
         let with_temperature = self.terms.contains(&Term::ZeroTemperature);
         let mut remarks = Vec::new();
         for channel in AXES {
@@ -29,12 +34,8 @@ impl ForceFit {
                 remarks.extend(self.remark(&parameters, channel, Term::Square(axis), "non-linearity"));
                 remarks.extend(self.remark(&parameters, channel, Term::Hysteresis(axis), "hysteresis"));
             }
-            remarks.extend(self.remark(
-                &parameters,
-                channel,
-                Term::Drift,
-                "drift of the zero over the series",
-            ));
+            let drift = "drift of the zero over the series";
+            remarks.extend(self.remark(&parameters, channel, Term::Drift, drift));
         }
         if !with_temperature {
             remarks
@@ -49,23 +50,13 @@ impl ForceFit {
             self.index(a, Term::Gain(a)).map_or(f64::NAN, |i| self.type_a[(i, i)].sqrt() / gain(a).abs())
         };
         let mut budget = vec![
-            BudgetLine::new(
-                "free fall, common to all loads",
-                Evaluation::B,
-                weighing.gravity_relative_sd,
-                "1",
-            ),
-            BudgetLine::new("masses, common to all loads", Evaluation::B, weighing.mass_relative_sd, "1"),
+            BudgetLine::b("free fall, common to all loads", weighing.gravity_relative_sd, "1"),
+            BudgetLine::b("masses, common to all loads", weighing.mass_relative_sd, "1"),
         ];
         for a in AXES {
-            budget.push(BudgetLine::new(
-                format!("repeatability of the {a} gain"),
-                Evaluation::A,
-                type_a(a),
-                "1",
-            ));
+            budget.push(BudgetLine::a(format!("repeatability of the {a} gain"), type_a(a), "1"));
             let sd = weighing.alignment_sd_rad[a as usize];
-            budget.push(BudgetLine::new(format!("direction of the {a} pull"), Evaluation::B, sd, "rad"));
+            budget.push(BudgetLine::b(format!("direction of the {a} pull"), sd, "rad"));
         }
         Outcome {
             kind: Kind::Force,

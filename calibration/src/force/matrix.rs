@@ -220,7 +220,6 @@ pub fn fit(readings: &[LoadReading], weighing: &Weighing, options: &Options) -> 
     Ok(result)
 }
 
-/// The columns of the design.
 struct Design {
     terms: Vec<Term>,
     mean_time_s: f64,

@@ -1,7 +1,7 @@
 //! The certificate of a phase calibration.
 
 use super::RepeatedShift;
-use crate::certificate::{BudgetLine, Evaluation, Kind, Outcome, Residuals, parameters};
+use crate::certificate::{BudgetLine, Finding, Kind, Outcome, Residuals, parameters};
 use models::quantity::PeakToPeak;
 use nalgebra::DMatrix;
 use std::collections::BTreeMap;
@@ -21,10 +21,11 @@ pub struct Acquisition {
 
 /// Everything that a phase certificate states: one parameter an amplitude.
 pub fn outcome(found: &[(PeakToPeak, RepeatedShift)], at: &Acquisition) -> Outcome {
-    let names: Vec<(String, &str)> =
-        found.iter().map(|(w, _)| (format!("phase_at_{:.3}_um_pp", w.micrometres()), "deg")).collect();
-    let values: Vec<f64> = found.iter().map(|(_, f)| f.phase_deg.value).collect();
-    let dof: Vec<f64> = found.iter().map(|(_, f)| f.phase_deg.degrees_of_freedom).collect();
+    let finding = |(w, f): &(PeakToPeak, RepeatedShift)| {
+        let (phase, name) = (&f.phase_deg, format!("phase_at_{:.3}_um_pp", w.micrometres()));
+        Finding::new(name, "deg", [phase.value, phase.standard_uncertainty], phase.degrees_of_freedom)
+    };
+    let findings: Vec<Finding> = found.iter().map(finding).collect();
     // The delays' doubt turns all phases alike.
     let common = (360.0 * at.frequency_hz * at.delay_sd_s).powi(2);
     let covariance = DMatrix::from_fn(found.len(), found.len(), |i, j| {
@@ -52,7 +53,7 @@ pub fn outcome(found: &[(PeakToPeak, RepeatedShift)], at: &Acquisition) -> Outco
         model: "Phi = 360 |t_pa - t_sa| / T (Eq. 1), mean on the circle over repeats".into(),
         settings,
         remarks,
-        parameters: parameters(&names, &values, &covariance, &dof),
+        parameters: parameters(&findings, &covariance),
         covariance,
         residuals: Residuals {
             count: found.iter().map(|(_, f)| f.repeats as u64).sum(),
@@ -63,11 +64,6 @@ pub fn outcome(found: &[(PeakToPeak, RepeatedShift)], at: &Acquisition) -> Outco
         },
         temperature_c: None,
         range: BTreeMap::from([("amplitude_pp_m".into(), range)]),
-        budget: vec![BudgetLine::new(
-            "delays of the decoders, common to all",
-            Evaluation::B,
-            common.sqrt(),
-            "deg",
-        )],
+        budget: vec![BudgetLine::b("delays of the decoders, common to all", common.sqrt(), "deg")],
     }
 }

@@ -52,7 +52,7 @@ pub fn run(args: Args, json: bool) -> miette::Result<ExitCode> {
         let (sets, to) = (args.sets, folder.display().to_string());
         let study = Study::begin(sets as u64, "sets", move |_: Vec<()>, done| {
             if json {
-                out!("{}", serde_json::json!({ "partial": true, "written": done, "sets": sets }));
+                answer_json(&json!({ "partial": true, "written": done, "sets": sets }));
             } else {
                 out!("partial: {done} of {sets} sets are in {to}");
             }
@@ -107,7 +107,7 @@ fn tell(scored: &[Scored], seed: u64, sets: usize, partial: bool, json: bool) ->
     let figures = figures(scored);
     let confusion = confusion(scored);
     if json {
-        let mut document = serde_json::json!({
+        let mut document = json!({
             "schema": "muprime.blind/1", "seed": seed, "sets": sets,
             "figures": figures, "reliability": diagram(scored.iter()),
             "reliability_of_what_can_be_told": diagram(scored.iter().filter(|s| identifiable(s))),
@@ -116,7 +116,7 @@ fn tell(scored: &[Scored], seed: u64, sets: usize, partial: bool, json: bool) ->
         if partial {
             document["partial"] = true.into();
         }
-        out!("{}", serde_json::to_string(&document).into_diagnostic()?);
+        answer_json(&document);
         return Ok(());
     }
     out!("{:52} {:>8}  {:>17}  {:>5}  target", "figure", "value", "95 % interval", "n");

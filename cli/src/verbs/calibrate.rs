@@ -49,7 +49,7 @@ fn write(issued: &Issued, json: bool) -> miette::Result<ExitCode> {
     runs::files::write_whole(out, issued.certificate.to_toml())?;
     if json {
         let mut document = issued.document();
-        document["certificate"] = serde_json::json!(out);
+        document["certificate"] = json!(out);
         out!("{document}");
     } else {
         show(&issued.certificate, out);
@@ -68,7 +68,7 @@ fn priors(args: &PriorsArgs, json: bool) -> miette::Result<ExitCode> {
             .map_err(|refusal| miette::miette!("{name}: {refusal}"))?;
     }
     if json {
-        out!("{}", serde_json::json!({ "calibration": priors }));
+        answer_json(&json!({ "calibration": priors }));
     } else {
         out!("[calibration]\n{}", toml::to_string(&priors).into_diagnostic()?.trim_end());
     }

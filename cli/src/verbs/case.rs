@@ -80,16 +80,13 @@ pub fn run(args: Args, json: bool) -> miette::Result<ExitCode> {
                 failed.filter(|n| *n > 0).map(|n| format!(", {n} without a result")).unwrap_or_default();
             out!("{}: {word}, {cases} cases{failed}", shard.display());
         }
-        shards.push(serde_json::json!({ "shard": shard, "cases": cases, "done": word, "failed": failed }));
+        shards.push(json!({ "shard": shard, "cases": cases, "done": word, "failed": failed }));
     }
     if let Some(Share { task, of }) = share {
         let part = Share { task, of }.part(study.file.header.cases);
         let (first, end) = (part.start, part.end);
         if json {
-            out!(
-                "{}",
-                serde_json::json!({ "task": task, "of": of, "range": [first, end], "shards": shards })
-            );
+            answer_json(&json!({ "task": task, "of": of, "range": [first, end], "shards": shards }));
         } else {
             out!("task {task} of {of}: cases {first}..{end}, {} shards were missing", shards.len());
         }

@@ -219,7 +219,7 @@ fn write(
     }
     file::write(&to.output, header.clone(), lines)?;
     if json {
-        out!("{}", serde_json::json!({ "file": to.output, "kind": kind.name, "cases": header.cases }));
+        answer_json(&json!({ "file": to.output, "kind": kind.name, "cases": header.cases }));
     } else {
         out!("{}: {} cases: {}", to.output.display(), header.cases, kind.words);
     }

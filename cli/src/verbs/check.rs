@@ -50,10 +50,10 @@ pub fn run(args: Args, json: bool) -> miette::Result<ExitCode> {
         let verdict = tables::check::file(file, &on);
         if json {
             let document = match &verdict {
-                Ok(good) => serde_json::json!({
+                Ok(good) => json!({
                     "file": file, "ok": true, "kind": good.kind, "passes": good.passes, "remarks": good.remarks,
                 }),
-                Err(e) => serde_json::json!({
+                Err(e) => json!({
                     "file": file, "ok": false, "problem": format!("{e}"), "causes": causes(e),
                     "help": e.help().map(|h| h.to_string()), "problems": problems_of(e),
                 }),

@@ -47,7 +47,7 @@ pub fn run(args: &Args, json: bool) -> miette::Result<ExitCode> {
         say!("report: {} (the dashboard compares two runs by itself)", page.display());
     }
     if json {
-        out!("{}", serde_json::json!(compared));
+        answer_json(&json!(compared));
     } else {
         out!("{}", folded(&terminal(&compared), 2));
     }
@@ -67,7 +67,7 @@ fn run_groups(args: &Args, json: bool) -> miette::Result<ExitCode> {
         say!("report: {}", page.display());
     }
     if json {
-        out!("{}", serde_json::json!(grouped));
+        answer_json(&json!(grouped));
         return exit(DONE);
     }
     let mut text = grouped.warnings.iter().map(|w| format!("note: {w}\n")).collect::<String>();
@@ -80,7 +80,6 @@ fn run_groups(args: &Args, json: bool) -> miette::Result<ExitCode> {
     exit(DONE)
 }
 
-/// The comparison for people.
 fn terminal(Compared { comparison: result, warnings: warned, differences: differ, .. }: &Compared) -> String {
     let mut text = String::new();
     let w = &mut text;
@@ -142,7 +141,6 @@ fn terminal(Compared { comparison: result, warnings: warned, differences: differ
     text
 }
 
-/// A text of so many characters at most.
 fn shortened(text: &str, most: usize) -> String {
     match text.char_indices().nth(most) {
         Some((end, _)) => format!("{}...", &text[..end]),

@@ -11,9 +11,6 @@ pub struct Args {
 }
 
 /// Prints the script.
-///
-/// # Errors
-/// None.
 pub fn run(args: &Args, command: &mut clap::Command) -> miette::Result<ExitCode> {
     let mut script = Vec::new();
     clap_complete::generate(args.shell, command, "muprime", &mut script);

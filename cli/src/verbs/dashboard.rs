@@ -58,7 +58,7 @@ pub fn run(args: Args, json: bool) -> miette::Result<ExitCode> {
     }
     let dashboard = args.place.serve(folder)?;
     if json {
-        out!("{}", serde_json::json!({ "dashboard": dashboard.link(), "address": dashboard.address }));
+        answer_json(&json!({ "dashboard": dashboard.link(), "address": dashboard.address }));
     } else {
         out!("{}", dashboard.link());
         say!(

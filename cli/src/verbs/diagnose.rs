@@ -12,9 +12,10 @@ use indicatif::ProgressBar;
 use miette::{Context, IntoDiagnostic};
 use models::pass::Pass;
 use runs::input::{MAX_TABLE_BYTES, bytes_of};
-use runs::print::folded;
+use runs::print::{self, folded};
 use runs::report::about;
 use runs::{out, say};
+use serde_json::json;
 use std::path::{Path, PathBuf};
 use std::process::ExitCode;
 use std::sync::{Arc, Mutex, PoisonError};
@@ -229,14 +230,9 @@ fn tell_partial(stage: Option<&Stage>, json: bool) {
     if json {
         let leading: Vec<_> = leading
             .iter()
-            .map(
-                |(effects, nats)| serde_json::json!({ "effects": effects, "log_evidence_over_no_gap": nats }),
-            )
+            .map(|(effects, nats)| json!({ "effects": effects, "log_evidence_over_no_gap": nats }))
             .collect();
-        out!(
-            "{}",
-            serde_json::json!({ "partial": true, "doing": doing, "share": share, "leading": leading })
-        );
+        print::answer_json(&json!({ "partial": true, "doing": doing, "share": share, "leading": leading }));
         return;
     }
     out!("partial: stopped at {:.0} % ({doing}); no verdict", 100.0 * share);

@@ -32,7 +32,7 @@ pub fn run(args: &Args, json: bool) -> miette::Result<ExitCode> {
     .into_diagnostic()?;
     let page = instruments::document::markdown(&profile);
     if json {
-        out!("{}", serde_json::json!({ "id": profile.id(), "markdown": page }));
+        answer_json(&json!({ "id": profile.id(), "markdown": page }));
     } else {
         out!("{}", page.trim_end());
     }

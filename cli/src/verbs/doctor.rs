@@ -72,7 +72,7 @@ pub fn run(args: Args, json: bool) -> miette::Result<ExitCode> {
     let good = findings.iter().chain(&instruments).all(|f| f.good);
     let judgement = Judgement { findings, lateness_us, instruments };
     if json {
-        out!("{}", serde_json::json!({ "good": good, "judgement": judgement }));
+        answer_json(&json!({ "good": good, "judgement": judgement }));
     } else {
         for f in judgement.findings.iter().chain(&judgement.instruments) {
             let mark = if f.good { "OK" } else { "FIX" };
@@ -96,7 +96,6 @@ pub fn run(args: Args, json: bool) -> miette::Result<ExitCode> {
     exit(if good { DONE } else { FAILED })
 }
 
-/// Judges the machine.
 fn judge(seconds: f64) -> (Vec<Finding>, Option<Lateness>) {
     let seconds = seconds.clamp(0.1, 60.0);
     let (grants, idle) = measure(seconds, 0);

@@ -28,7 +28,7 @@ pub fn run(args: Args, json: bool) -> miette::Result<ExitCode> {
     let run = runs::report::read(&args.run)?;
     let out = export(&args.run, &run, args.to, &args.stated, args.out.as_deref())?;
     if json {
-        out!("{}", serde_json::json!({ "file": out, "passes": run.passes.len(), "damage": run.damage }));
+        answer_json(&json!({ "file": out, "passes": run.passes.len(), "damage": run.damage }));
     } else {
         say!("{} passes: {}", run.passes.len(), out.display());
         run.damage.iter().for_each(|d| say!("{d}"));

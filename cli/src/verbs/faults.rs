@@ -56,7 +56,7 @@ pub fn run(args: Args, json: bool) -> miette::Result<ExitCode> {
             miette::bail!("{}: a strike's row is beyond the list", path.display());
         }
         let found = run_scene(&scene, true);
-        out!("{}", serde_json::to_string(&found).into_diagnostic()?);
+        answer_json(&found);
         return exit(if found.wrong.is_empty() { DONE } else { FAILED });
     }
     let seeds = args.scenes.seeds;
@@ -118,10 +118,10 @@ fn document(tally: &Tally, speed: Option<f64>, partial: bool) -> miette::Result<
         .reactions
         .iter()
         .map(|((number, name, moment), r)| {
-            serde_json::json!({ "number": number, "fault": name, "phase": moment, "reactions": r })
+            json!({ "number": number, "fault": name, "phase": moment, "reactions": r })
         })
         .collect();
-    let mut document = serde_json::json!({
+    let mut document = json!({
         "runs": tally.scenes, "simulated_seconds_per_core_second": speed, "failed": tally.failed, "rows": rows, "failures": tally.failures
     });
     if partial {

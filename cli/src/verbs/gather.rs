@@ -29,7 +29,7 @@ pub fn run(args: Args, json: bool) -> miette::Result<ExitCode> {
     let to = args.output.unwrap_or_else(|| study.out.join("gathered.parquet"));
     let gathered = gather(&study, &to, args.any_build)?;
     if json {
-        out!("{}", serde_json::to_string(&gathered).into_diagnostic()?);
+        answer_json(&gathered);
     } else {
         if gathered.parts > 0 {
             say!("{} unfinished files in parts/: of workers at work, or killed", gathered.parts);

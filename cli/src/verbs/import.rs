@@ -2,10 +2,10 @@
 
 use super::prelude::*;
 use models::covariate;
+use runs::ask;
 use runs::files::{make_folder, write_whole};
 use runs::input::{MAX_TABLE_BYTES, bytes_of};
 use runs::report::human::number;
-use runs::{ask, out, say};
 use std::io::IsTerminal;
 use tables::import::guess::guess;
 use tables::import::map::Map;
@@ -122,7 +122,7 @@ pub fn run(args: Args, json: bool) -> miette::Result<ExitCode> {
     let written = serde_json::to_string_pretty(&log).into_diagnostic()?;
     write_whole(&args.out.join("import.json"), &written)?;
     if json {
-        out!("{}", serde_json::to_string(&log).into_diagnostic()?);
+        answer_json(&log);
         return exit(DONE);
     }
     say!("{source}: {}; {} rows", log.format, log.rows);

@@ -14,7 +14,6 @@ mod table;
 mod tabulate;
 
 use clap::{Args, Subcommand};
-use runs::say;
 use std::process::ExitCode;
 
 /// Arguments of `muprime model`.
@@ -69,8 +68,7 @@ pub fn run(args: ModelArgs, json: bool) -> miette::Result<ExitCode> {
     }
 }
 
-/// Bad input: says why and gives its exit status (docs/contract.md).
-fn refused(why: impl std::fmt::Display) -> miette::Result<ExitCode> {
-    say!("refused: {why}");
-    Ok(ExitCode::from(2))
+/// Bad input: a refusal, with the words of its error.
+fn refused(why: impl std::fmt::Display) -> miette::Report {
+    miette::miette!("{why}")
 }

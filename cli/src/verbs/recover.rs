@@ -34,7 +34,7 @@ pub fn run(args: Args, json: bool) -> miette::Result<ExitCode> {
         Ok(Recovery::Rewritten { messages, found }) => {
             let original = put_in_place(file, &part)?;
             if json {
-                let document = serde_json::json!({ "recovered": true, "messages": messages, "original": original,
+                let document = json!({ "recovered": true, "messages": messages, "original": original,
                     "damaged": found.damaged_places, "because": found.sentences().join("; "), "integrity": found });
                 out!("{document}");
             } else {
@@ -55,10 +55,7 @@ pub fn run(args: Args, json: bool) -> miette::Result<ExitCode> {
                 }
                 Recovery::Whole(found) | Recovery::Rewritten { found, .. } => {
                     if json {
-                        out!(
-                            "{}",
-                            serde_json::json!({ "recovered": false, "whole": true, "integrity": found })
-                        );
+                        answer_json(&json!({ "recovered": false, "whole": true, "integrity": found }));
                     } else {
                         say!("{}: whole, nothing to do", shown());
                         tell(&found);

@@ -49,7 +49,7 @@ pub fn run(args: Args, json: bool) -> miette::Result<ExitCode> {
         let found = again(path)?;
         holds &= found.holds;
         if json {
-            out!("{}", serde_json::to_string(&found).into_diagnostic()?);
+            answer_json(&found);
         } else {
             tell(&found);
         }

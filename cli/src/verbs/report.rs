@@ -1,7 +1,9 @@
 //! `muprime report FOLDER`: the page of a run, or of a campaign.
 
+use runs::print::answer_json;
 use runs::report::published;
-use runs::{out, say};
+use runs::say;
+use serde_json::json;
 use std::path::PathBuf;
 use std::process::ExitCode;
 
@@ -36,10 +38,7 @@ pub fn run(args: Args, json: bool) -> miette::Result<ExitCode> {
         }
         let (claims, made, planned) = super::run::campaign::write(&args.run)?;
         if json {
-            out!(
-                "{}",
-                serde_json::json!({ "report": args.run.join(super::run::campaign::PAGE), "claims": claims })
-            );
+            answer_json(&json!({ "report": args.run.join(super::run::campaign::PAGE), "claims": claims }));
         } else {
             super::run::campaign::tell(&claims, made, planned, &args.run);
         }
@@ -50,7 +49,7 @@ pub fn run(args: Args, json: bool) -> miette::Result<ExitCode> {
     let out = args.out.unwrap_or_else(|| args.run.join("report.html"));
     runs::files::write_output(&out, html)?;
     if json {
-        out!("{}", serde_json::json!({ "report": out, "damage": damage }));
+        answer_json(&json!({ "report": out, "damage": damage }));
     } else {
         say!("report: {}", out.display());
         damage.iter().for_each(|d| say!("{d}"));

@@ -14,12 +14,13 @@ use rig::publish::{Broker, Publisher};
 use rig::watch::{Lead, Watch};
 use runs::catalogue::runs_folder;
 use runs::plan::Plan;
-use runs::print::{self, clean, folded};
+use runs::print::{self, answer_json, clean, folded};
+use runs::say;
 use runs::sequence::{Event, Outcome};
 use runs::session::{Job, Notes, Signals, Summary, Update, unix_ns};
 use runs::setup::Setup;
 use runs::supervisor::MAY_BE_ON;
-use runs::{out, say};
+use serde_json::json;
 use std::io::IsTerminal;
 use std::net::SocketAddr;
 use std::path::{Path, PathBuf};
@@ -212,7 +213,7 @@ fn measure(job: Job, watching: &Watching, json: bool) -> miette::Result<bool> {
             publisher.publish(name, &message());
         }
     };
-    let of = serde_json::json!({ "plan": job.plan.file.name, "setup": job.setup.file.name, "planned": planned, "guards": job.setup.guards() });
+    let of = json!({ "plan": job.plan.file.name, "setup": job.setup.file.name, "planned": planned, "guards": job.setup.guards() });
     let began = |state: &str| {
         let mut run = of.clone();
         run["state"] = state.into();
@@ -225,28 +226,25 @@ fn measure(job: Job, watching: &Watching, json: bool) -> miette::Result<bool> {
         feed.news(&news);
         match news {
             Update::Pass(pass) => {
-                publish("pass", &|| serde_json::json!(pass));
+                publish("pass", &|| json!(pass));
                 if json {
-                    out!("{}", serde_json::json!({ "pass": pass }));
+                    answer_json(&json!({ "pass": pass }));
                 }
             }
             Update::Event(event) => {
-                publish("event", &|| serde_json::json!(event));
+                publish("event", &|| json!(event));
                 if let Event::Tripped(trip) = event {
                     publish("trip", &|| tripped(trip));
                 }
                 if json {
-                    out!("{}", serde_json::json!({ "event": event }));
+                    answer_json(&json!({ "event": event }));
                 } else {
                     say(runs::report::events::describe(event));
                 }
             }
-            Update::State(snapshot) => publish("state", &|| serde_json::json!(live::State::of(snapshot))),
+            Update::State(snapshot) => publish("state", &|| json!(live::State::of(snapshot))),
             Update::Progress(made, all, left_s) => {
-                publish(
-                    "progress",
-                    &|| serde_json::json!({ "made": made, "planned": all, "remaining_s": left_s }),
-                );
+                publish("progress", &|| json!({ "made": made, "planned": all, "remaining_s": left_s }));
                 let bar = bar.clone();
                 print::draw("", move || {
                     bar.set_position((planned.saturating_sub(all) + made) as u64);
@@ -255,9 +253,9 @@ fn measure(job: Job, watching: &Watching, json: bool) -> miette::Result<bool> {
             }
             Update::Off(off) if !off.read_back => {
                 print::urgent(&fitted(off.words()));
-                publish("off", &|| serde_json::json!(off));
+                publish("off", &|| json!(off));
                 if json {
-                    out!("{}", serde_json::json!({ "off": off }));
+                    answer_json(&json!({ "off": off }));
                 }
             }
             Update::Off(_) => {}
@@ -272,8 +270,8 @@ fn measure(job: Job, watching: &Watching, json: bool) -> miette::Result<bool> {
     publish("run", &|| {
         let mut ended = began("ended");
         ended["summary"] = summary.as_ref().map_or_else(
-            |why| serde_json::json!({ "error": why.to_string() }),
-            |summary| serde_json::json!({ "passes": summary.passes, "outcome": summary.outcome, "off": summary.off }),
+            |why| json!({ "error": why.to_string() }),
+            |summary| json!({ "passes": summary.passes, "outcome": summary.outcome, "off": summary.off }),
         );
         ended
     });
@@ -288,7 +286,7 @@ fn measure(job: Job, watching: &Watching, json: bool) -> miette::Result<bool> {
 
 /// A trip for whoever follows from afar.
 fn tripped(trip: &realtime::safety::Trip) -> serde_json::Value {
-    serde_json::json!({
+    json!({
         "cause": trip.cause, "value": Some(trip.value).filter(|v| v.is_finite()), "bound": trip.bound, "unit": trip.unit.symbol(),
         "at_s": trip.at.seconds(), "requirement": trip.cause.requirement(), "remedy": trip.cause.remedy(),
     })
@@ -370,7 +368,7 @@ fn progress_bar(json: bool, planned: u64) -> ProgressBar {
 
 fn tell(summary: &Summary, json: bool) {
     if json {
-        out!("{}", serde_json::json!({ "summary": summary }));
+        answer_json(&json!({ "summary": summary }));
         return;
     }
     if !summary.off.read_back {

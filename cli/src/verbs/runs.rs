@@ -43,7 +43,7 @@ pub fn run(args: Args, json: bool) -> miette::Result<ExitCode> {
     if let Some(run) = &args.run {
         let annotations = annotate(run, &args)?;
         if json {
-            out!("{}", serde_json::to_string(&annotations).into_diagnostic()?);
+            answer_json(&annotations);
         } else {
             let tags = if annotations.tags.is_empty() { "none".into() } else { annotations.tags.join(", ") };
             out!("tags: {tags}");
@@ -58,7 +58,7 @@ pub fn run(args: Args, json: bool) -> miette::Result<ExitCode> {
     runs.retain(|r| args.find.as_ref().is_none_or(|words| r.has(words)));
     sort(&mut runs, args.sort);
     if json {
-        out!("{}", serde_json::to_string(&runs).into_diagnostic()?);
+        answer_json(&runs);
         return exit(DONE);
     }
     for r in runs {

@@ -11,9 +11,6 @@ pub struct Args {
 }
 
 /// Prints the schema.
-///
-/// # Errors
-/// None.
 pub fn run(args: &Args) -> miette::Result<ExitCode> {
     out!("{}", serde_json::to_string_pretty(&args.kind.for_editors()).into_diagnostic()?);
     exit(DONE)

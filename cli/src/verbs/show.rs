@@ -28,17 +28,17 @@ pub fn run(args: &Args, json: bool) -> miette::Result<ExitCode> {
     let all = all();
     match (&args.name, args.sample) {
         (_, Some(sample)) => {
-            let folder = args.out.clone().unwrap_or_else(|| sample.name().into());
+            let folder = args.out.clone().unwrap_or_else(|| tables::schemas::schema::typed(sample).into());
             let table = sample::write(sample, &folder)?;
             if json {
-                out!("{}", serde_json::json!({ "table": table }));
+                answer_json(&json!({ "table": table }));
             } else if sample == Sample::Foreign {
                 say!("{}; next: muprime import {} -o imported", table.display(), table.display());
             } else {
                 say!("{}; next: muprime diagnose {}", table.display(), folder.display());
             }
         }
-        (None, _) if json => all.iter().for_each(|b| out!("{}", serde_json::json!(b))),
+        (None, _) if json => all.iter().for_each(|b| answer_json(&json!(b))),
         (None, _) => all
             .iter()
             .for_each(|b| out!("{}", folded(&format!("{:<10} {:<26} {}", b.kind, b.name, b.about()), 38))),
@@ -50,7 +50,7 @@ pub fn run(args: &Args, json: bool) -> miette::Result<ExitCode> {
                 );
             };
             if json {
-                out!("{}", serde_json::json!({ "kind": found.kind, "name": found.name, "text": found.text }));
+                answer_json(&json!({ "kind": found.kind, "name": found.name, "text": found.text }));
             } else {
                 out!("{}", found.text.trim_end());
             }

@@ -32,7 +32,7 @@ pub fn run(args: Args, json: bool) -> miette::Result<ExitCode> {
     if args.cancel {
         let ids = cancel(&args.out)?;
         if json {
-            out!("{}", serde_json::json!({ "cancelled": ids }));
+            answer_json(&json!({ "cancelled": ids }));
         } else {
             out!("cancelled: {}", if ids.is_empty() { "nothing was at work".into() } else { ids.join(", ") });
         }
@@ -55,7 +55,7 @@ pub fn run(args: Args, json: bool) -> miette::Result<ExitCode> {
     let submitted = submit(&study, options)?;
     let whole = submitted.missing == 0 || options.detach;
     if json {
-        out!("{}", serde_json::to_string(&submitted).into_diagnostic()?);
+        answer_json(&submitted);
     } else {
         if let Some(pilot) = submitted.pilot {
             say!(

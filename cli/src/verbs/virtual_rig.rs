@@ -93,7 +93,7 @@ pub fn run(args: Args, json: bool) -> miette::Result<ExitCode> {
     };
     let modbus_tcp = embedded.modbus_tcp().map(|address| address.to_string());
     if json {
-        out!("{}", serde_json::json!({ "modbus_tcp": modbus_tcp, "instruments": embedded.places }));
+        answer_json(&json!({ "modbus_tcp": modbus_tcp, "instruments": embedded.places }));
     } else {
         for place in &embedded.places {
             say!("{place}");
@@ -130,9 +130,9 @@ fn at_the_bench(hands: &Hands, plant: &SharedPlant) {
                     let (guard, now) = plant.now();
                     hands.hang(lateral, normal);
                     drop(guard);
-                    serde_json::json!({ "time_s": now.seconds(), "hung_n": [lateral, normal] })
+                    json!({ "time_s": now.seconds(), "hung_n": [lateral, normal] })
                 }
-                _ => serde_json::json!({ "error": "hang LATERAL_N NORMAL_N: two forces of at most 1000 N" }),
+                _ => json!({ "error": "hang LATERAL_N NORMAL_N: two forces of at most 1000 N" }),
             },
             ["look"] => {
                 let (mut guard, _) = plant.now();
@@ -140,12 +140,12 @@ fn at_the_bench(hands: &Hands, plant: &SharedPlant) {
                     (guard.measure(Quantity::OutputOn) != 0.0, guard.measure(Quantity::Velocity));
                 drop(guard);
                 let seen = hands.look();
-                serde_json::json!({
+                json!({
                     "time_s": seen.time_s, "frequency_hz": seen.frequency_hz,
                     "amplitude_pp_m": seen.amplitude_pp_m, "output_on": on, "velocity_m_s": velocity_m_s,
                 })
             }
-            _ => serde_json::json!({ "error": format!("`{line}`: hang LATERAL_N NORMAL_N, or look") }),
+            _ => json!({ "error": format!("`{line}`: hang LATERAL_N NORMAL_N, or look") }),
         };
         out!("{answer}");
     }

@@ -193,7 +193,6 @@ fn one(dbc: &can_dbc::Dbc, message: &can_dbc::Message, begins: &Beginning) -> Db
     DbcMessage { id, extended, length, signals, fault }
 }
 
-/// Where a signal is in its message.
 fn place(
     dbc: &can_dbc::Dbc,
     message: &can_dbc::Message,

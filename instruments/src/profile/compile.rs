@@ -58,7 +58,7 @@ impl Compiler<'_> {
             if let Some(echo) = set.echo.as_ref().filter(|echo| index(echo).is_none()) {
                 let message =
                     format!("the echo of set-point `{}`, `{echo}`, is not a signal", set.name.as_ref());
-                return Err(self.at(set.name.span(), message));
+                return Err(self.at_name(&set.name, message));
             }
         }
         self.check_emulator(&index)?;
@@ -70,22 +70,35 @@ impl Compiler<'_> {
         ProfileError::at(self.text, Some(span), message)
     }
 
+    /// A refusal of what stands under a name.
+    pub(super) fn at_name(&self, name: &toml::Spanned<String>, message: impl Into<String>) -> ProfileError {
+        self.at(name.span(), message)
+    }
+
+    /// A file that the profile names, read by its parser; refusals stand where the profile names it.
+    fn read<T>(&self, name: &str, parse: impl Fn(&str) -> Result<T, String>) -> Result<T, ProfileError> {
+        let text = (self.file)(name);
+        let text = text.ok_or_else(|| self.at_text(name, format!("the file `{name}` is not there")))?;
+        parse(&text).map_err(|why| self.at_text(name, format!("{name}: {why}")))
+    }
+
+    /// A refusal of a text of the profile, at its first place there.
+    pub(super) fn at_text(&self, text: &str, message: impl Into<String>) -> ProfileError {
+        let place = self.text.find(text).map(|at| at..at + text.len());
+        ProfileError::at(self.text, place, message)
+    }
+
     /// The messages of the DBC file, if the profile names one.
     fn dbc(&self) -> Result<Messages, ProfileError> {
         let Some(name) = &self.description.link.dbc else { return Ok(HashMap::new()) };
-        let place = self.text.find(name.as_str()).map(|at| at..at + name.len());
-        let error = |message: String| ProfileError::at(self.text, place.clone(), message);
-        let text = (self.file)(name).ok_or_else(|| error(format!("the file `{name}` is not there")))?;
-        dbc::parse(&text).map_err(|why| error(format!("{name}: {why}")))
+        self.read(name, dbc::parse)
     }
 
     /// The objects of the profile's data sheet, if it names one, and what the profile writes to them at connection.
     fn eds(&self) -> Result<Objects, ProfileError> {
         let Some(name) = &self.description.link.eds else { return Ok(Objects::new()) };
-        let place = self.text.find(name.as_str()).map(|at| at..at + name.len());
-        let error = |message: String| ProfileError::at(self.text, place.clone(), message);
-        let text = (self.file)(name).ok_or_else(|| error(format!("the file `{name}` is not there")))?;
-        let sheet = eds::parse(&text).map_err(|why| error(format!("{name}: {why}")))?;
+        let error = |why: String| self.at_text(name, format!("{name}: {why}"));
+        let sheet = self.read(name, eds::parse)?;
         for (index, sub, bytes, _) in self.description.init.iter().filter_map(|init| init.sdo) {
             let wrong = match sheet.get(&(index, sub)) {
                 None => "is not in the data sheet",
@@ -95,21 +108,16 @@ impl Compiler<'_> {
                 }
                 Some(_) => continue,
             };
-            return Err(error(format!("{name}: object {index:04X}sub{sub} of an [[init]] {wrong}")));
+            return Err(error(format!("object {index:04X}sub{sub} of an [[init]] {wrong}")));
         }
-        for (first, cob, length) in (self.description.message.iter())
-            .filter_map(|m| Some((0x1800, m.cob?, usize::from(m.length.unwrap_or(8)))))
-            .chain(
-                self.description
-                    .write
-                    .iter()
-                    .filter_map(|w| Some((0x1400, w.cob?, 2 * usize::from(w.count)))),
-            )
-        {
-            let (_, mapped) =
-                eds::mapping(&sheet, first, cob).map_err(|why| error(format!("{name}: {why}")))?;
+        let d = self.description;
+        let sent =
+            d.message.iter().filter_map(|m| Some((0x1800, m.cob?, usize::from(m.length.unwrap_or(8)))));
+        let taken = d.write.iter().filter_map(|w| Some((0x1400, w.cob?, 2 * usize::from(w.count))));
+        for (first, cob, length) in sent.chain(taken) {
+            let (_, mapped) = eds::mapping(&sheet, first, cob).map_err(error)?;
             if mapped != length {
-                let why = format!("{name}: the frame {cob:#x} has {mapped} bytes, the profile says {length}");
+                let why = format!("the frame {cob:#x} has {mapped} bytes, the profile says {length}");
                 return Err(error(why));
             }
         }
@@ -125,7 +133,7 @@ impl Compiler<'_> {
         sheet: &Objects,
         name: &toml::Spanned<String>,
     ) -> Result<Field, ProfileError> {
-        let error = |why: String| self.at(name.span(), format!("`{}`: {why}", name.as_ref()));
+        let error = |why: String| self.at_name(name, format!("`{}`: {why}", name.as_ref()));
         let (object, cob) =
             object.zip(cob).ok_or_else(|| error("`object` needs a frame with `cob`".into()))?;
         let (placed, _) = eds::mapping(sheet, first, cob).map_err(error)?;
@@ -148,41 +156,27 @@ impl Compiler<'_> {
         let mut frames = Vec::new();
         for (i, poll) in d.poll.iter().enumerate() {
             let spans = self.spans(poll)?;
+            let bytes = spans.iter().map(|span| 2 * usize::from(span.count)).sum();
             frames.push(Frame {
-                name: poll.name.as_ref().clone(),
-                bytes: spans.iter().map(|span| 2 * usize::from(span.count)).sum(),
                 spans,
                 sequence: by_name(&poll.sequence),
                 device_time: by_name(&poll.device_time),
-                kind: FrameKind::Poll(i),
-                text: None,
+                ..Frame::new(poll.name.as_ref(), bytes, FrameKind::Poll(i))
             });
         }
         if let Some(stream) = &d.stream {
             let text = stream.line.as_deref().map(|line| self.pattern(line)).transpose()?.map(Form::Pattern);
-            frames.push(Frame {
-                name: "stream".into(),
-                bytes: text
-                    .as_ref()
-                    .map_or(usize::from(stream.length.unwrap_or(0)), |form| 8 * form.numbers()),
-                sequence: by_name(&stream.sequence),
-                device_time: None,
-                spans: Vec::new(),
-                kind: FrameKind::Stream,
-                text,
-            });
+            let length = || usize::from(stream.length.unwrap_or(0));
+            let bytes = text.as_ref().map_or_else(length, |form| 8 * form.numbers());
+            let sequence = by_name(&stream.sequence);
+            frames.push(Frame { sequence, text, ..Frame::new("stream", bytes, FrameKind::Stream) });
         }
         for (i, message) in d.message.iter().enumerate() {
             let parts = self.parts(message, messages)?;
-            frames.push(Frame {
-                name: message.name.as_ref().clone(),
-                bytes: parts.iter().map(|part| part.length).sum(),
-                sequence: by_name(&message.sequence),
-                device_time: None,
-                spans: Vec::new(),
-                kind: FrameKind::Messages(i, parts),
-                text: None,
-            });
+            let bytes = parts.iter().map(|part| part.length).sum();
+            let sequence = by_name(&message.sequence);
+            let kind = FrameKind::Messages(i, parts);
+            frames.push(Frame { sequence, ..Frame::new(message.name.as_ref(), bytes, kind) });
         }
         for (i, query) in d.query.iter().enumerate() {
             let text = match (query.length, &query.answer, &query.unit) {
@@ -192,15 +186,8 @@ impl Compiler<'_> {
                 (Some(_), ..) => None,
             };
             let numbers = text.as_ref().map_or(0, Form::numbers);
-            frames.push(Frame {
-                name: query.name.as_ref().clone(),
-                bytes: query.length.map_or(NumberType::F64.bytes() * numbers, usize::from),
-                sequence: None,
-                device_time: None,
-                spans: Vec::new(),
-                kind: FrameKind::Query(i),
-                text,
-            });
+            let bytes = query.length.map_or(NumberType::F64.bytes() * numbers, usize::from);
+            frames.push(Frame { text, ..Frame::new(query.name.as_ref(), bytes, FrameKind::Query(i)) });
         }
         let mut seen = std::collections::HashSet::new();
         let names = frames
@@ -210,11 +197,8 @@ impl Compiler<'_> {
         for name in names {
             if !seen.insert(name) {
                 let place = self.text.rfind(&format!("\"{name}\"")).map(|at| at..at + name.len() + 2);
-                return Err(ProfileError::at(
-                    self.text,
-                    place,
-                    format!("a second frame or block is called `{name}`"),
-                ));
+                let why = format!("a second frame or block is called `{name}`");
+                return Err(ProfileError::at(self.text, place, why));
             }
         }
         Ok(frames)
@@ -223,47 +207,44 @@ impl Compiler<'_> {
     /// Identifiers (less their base) and lengths of a group's messages.
     fn parts(&self, group: &Message, messages: &Messages) -> Result<Vec<Part>, ProfileError> {
         let name = group.name.as_ref();
+        let wrong = |why: String| self.at_name(&group.name, why);
         if let Some(cob) = group.cob {
             let length = usize::from(group.length.unwrap_or(8));
             return Ok(vec![Part { id: cob, extended: false, length, selector: None }]);
         }
         if group.replies.is_empty() {
-            return Err(
-                self.at(group.name.span(), format!("message group `{name}` needs `replies` or `cob`"))
-            );
+            return Err(wrong(format!("message group `{name}` needs `replies` or `cob`")));
         }
         let part = |reply: &String| {
-            let message = messages.get(reply).ok_or_else(|| {
-                self.at(group.name.span(), format!("`{reply}` of `{name}` is not a message of the DBC file"))
-            })?;
+            let message = messages
+                .get(reply)
+                .ok_or_else(|| wrong(format!("`{reply}` of `{name}` is not a message of the DBC file")))?;
             if let Some(fault) = &message.fault {
-                return Err(
-                    self.at(group.name.span(), format!("`{reply}` of `{name}` cannot be used: {fault}"))
-                );
+                return Err(wrong(format!("`{reply}` of `{name}` cannot be used: {fault}")));
             }
-            let id = message.id.checked_sub(group.dbc_base.unwrap_or(0)).ok_or_else(|| {
-                self.at(group.name.span(), format!("the identifier of `{reply}` is below `dbc_base`"))
-            })?;
+            let id = message
+                .id
+                .checked_sub(group.dbc_base.unwrap_or(0))
+                .ok_or_else(|| wrong(format!("the identifier of `{reply}` is below `dbc_base`")))?;
             if message.length > 8 {
                 let why = format!("`{reply}` has {} bytes: CAN FD is not supported", message.length);
-                return Err(self.at(group.name.span(), why));
+                return Err(wrong(why));
             }
             let selector = group.multiplex.zip(message.selector()).map(|(value, signal)| (signal, value));
             if let Some((signal, value)) = selector.filter(|(signal, value)| *value > signal.mask()) {
                 let why = format!("`multiplex` of `{name}`: {value} does not fit the {} bits", signal.size);
-                return Err(self.at(group.name.span(), why));
+                return Err(wrong(why));
             }
             Ok(Part { id, extended: message.extended, length: message.length, selector })
         };
         let parts: Vec<Part> = group.replies.iter().map(part).collect::<Result<_, _>>()?;
         if group.multiplex.is_some() && parts.iter().all(|part| part.selector.is_none()) {
             let why = format!("`multiplex` of `{name}`: none of its messages has a multiplexor");
-            return Err(self.at(group.name.span(), why));
+            return Err(wrong(why));
         }
         Ok(parts)
     }
 
-    /// The reads of a poll.
     fn spans(&self, poll: &Poll) -> Result<Vec<Span>, ProfileError> {
         if let (Some(address), Some(count)) = (poll.address, poll.count) {
             return Ok(vec![Span { address, count }]);
@@ -277,7 +258,7 @@ impl Compiler<'_> {
             let count = signal.number.map_or(1, |number| number.bytes().div_ceil(2)) as u16;
             if u32::from(address) + u32::from(count) > 65536 {
                 let why = format!("signal `{}` runs past register 65535", signal.name.as_ref());
-                return Err(self.at(signal.name.span(), why));
+                return Err(self.at_name(&signal.name, why));
             }
             wanted.push(Span { address, count });
         }
@@ -285,7 +266,7 @@ impl Compiler<'_> {
             let why = format!(
                 "poll `{name}` needs `address` and `count`, or signals with an `address` of their own"
             );
-            return Err(self.at(poll.name.span(), why));
+            return Err(self.at_name(&poll.name, why));
         }
         Ok(Span::cover(wanted, poll.gap))
     }
@@ -311,10 +292,12 @@ impl Compiler<'_> {
         index: &dyn Fn(&str) -> Option<usize>,
     ) -> Result<CompiledSignal, ProfileError> {
         let name = s.name.as_ref();
+        let wrong = |why: String| self.at_name(&s.name, why);
         let frame = match &s.frame {
-            Some(wanted) => frames.iter().position(|frame| frame.name == *wanted).ok_or_else(|| {
-                self.at(s.name.span(), format!("the frame of signal `{name}`, `{wanted}`, does not exist"))
-            })?,
+            Some(wanted) => frames
+                .iter()
+                .position(|frame| frame.name == *wanted)
+                .ok_or_else(|| wrong(format!("the frame of signal `{name}`, `{wanted}`, does not exist")))?,
             None if frames.len() == 1 => 0,
             None => {
                 // The pattern of an answer says itself which numbers it holds.
@@ -326,7 +309,7 @@ impl Compiler<'_> {
                 let (Some(one), None) = (holding.next(), holding.next()) else {
                     let names: Vec<&str> = frames.iter().map(|frame| frame.name.as_str()).collect();
                     let message = format!("signal `{name}` needs `frame`, one of {}", names.join(", "));
-                    return Err(self.at(s.name.span(), message));
+                    return Err(wrong(message));
                 };
                 one
             }
@@ -341,16 +324,11 @@ impl Compiler<'_> {
             }
             None => self.place(s, &frames[frame], messages)?,
             Some(value) => {
-                if s.register.is_some()
-                    || s.address.is_some()
-                    || s.byte.is_some()
-                    || s.dbc.is_some()
-                    || s.number.is_some()
-                {
+                if s.has_place() || s.dbc.is_some() {
                     let message = format!("signal `{name}` is worked out: it stands nowhere and has no type");
-                    return Err(self.at(s.name.span(), message));
+                    return Err(wrong(message));
                 }
-                let why = |why| self.at(s.name.span(), format!("signal `{name}`: {why}"));
+                let why = |why| wrong(format!("signal `{name}`: {why}"));
                 Place::Computed(Expression::compile(value, index).map_err(why)?)
             }
         };
@@ -358,19 +336,17 @@ impl Compiler<'_> {
             self.check_field(field, frames[frame].bytes, s.name.span(), name)?;
         }
         if s.scale == 0.0 || !s.scale.is_finite() || !s.si.factor.is_finite() || s.si.factor == 0.0 {
-            return Err(self.at(s.name.span(), format!("a scale of signal `{name}` is zero or not finite")));
+            return Err(wrong(format!("a scale of signal `{name}` is zero or not finite")));
         }
         if s.range.is_some_and(|(low, high)| low >= high || low.is_nan() || high.is_nan()) {
-            return Err(self.at(s.name.span(), format!("the range of signal `{name}` is empty")));
+            return Err(wrong(format!("the range of signal `{name}` is empty")));
         }
         let compile = |text: &Option<String>| {
-            let why = |why| self.at(s.name.span(), format!("signal `{name}`: {why}"));
+            let why = |why| wrong(format!("signal `{name}`: {why}"));
             text.as_ref().map(|text| Expression::compile(text, index).map_err(why)).transpose()
         };
         if s.resolution_si.is_some_and(|step| !(step.is_finite() && step > 0.0)) {
-            return Err(
-                self.at(s.name.span(), format!("`resolution_si` of signal `{name}` must be above zero"))
-            );
+            return Err(wrong(format!("`resolution_si` of signal `{name}` must be above zero")));
         }
         let step = match (&place, &frames[frame].text) {
             (_, Some(Form::Pattern(pattern))) => {
@@ -394,7 +370,6 @@ impl Compiler<'_> {
         })
     }
 
-    /// Where a signal stands in its frame.
     fn place(
         &self,
         s: &crate::schema::Signal,
@@ -402,10 +377,9 @@ impl Compiler<'_> {
         messages: &Messages,
     ) -> Result<Place, ProfileError> {
         let name = s.name.as_ref();
+        let wrong = |why: String| self.at_name(&s.name, why);
         if let Some(path) = &s.dbc {
-            let unknown = || {
-                self.at(s.name.span(), format!("`{path}` of signal `{name}` is not a signal of its messages"))
-            };
+            let unknown = || wrong(format!("`{path}` of signal `{name}` is not a signal of its messages"));
             let (message, signal) = path.split_once('.').ok_or_else(unknown)?;
             let signal = messages.get(message).and_then(|m| m.signals.get(signal)).ok_or_else(unknown)?;
             let FrameKind::Messages(group, _) = frame.kind else { return Err(unknown()) };
@@ -427,7 +401,7 @@ impl Compiler<'_> {
                 _ => (String::new(), String::new()),
             };
             if !why.is_empty() {
-                return Err(self.at(s.name.span(), why).with_help(&help));
+                return Err(wrong(why).with_help(&help));
             }
             let which = replies.iter().position(|reply| reply == message).ok_or_else(unknown)?;
             let before =
@@ -435,40 +409,26 @@ impl Compiler<'_> {
             return Ok(Place::Dbc(before, *signal));
         }
         let text_answer = frame.text.is_some();
-        if text_answer
-            && (s.register.is_some()
-                || s.address.is_some()
-                || s.byte.is_some()
-                || s.number.is_some()
-                || s.bits.is_some())
-        {
+        if text_answer && (s.has_place() || s.bits.is_some()) {
             let why =
                 format!("signal `{name}` stands in a line of text: it has no register, byte, type or bits");
-            return Err(self.at(s.name.span(), why));
+            return Err(wrong(why));
         }
         if let Some(Form::Pattern(pattern)) = &frame.text {
             let at = pattern.fields().position(|(field, _)| field == name).ok_or_else(|| {
-                self.at(
-                    s.name.span(),
-                    format!("signal `{name}` does not stand in the line of `{}`", frame.name),
-                )
+                wrong(format!("signal `{name}` does not stand in the line of `{}`", frame.name))
             })?;
-            return Ok(Place::Bytes(Field {
-                at: 8 * at,
-                number: NumberType::F64,
-                order: ByteOrder::Abcd,
-                bits: None,
-            }));
+            let (number, order) = (NumberType::F64, ByteOrder::Abcd);
+            return Ok(Place::Bytes(Field { at: 8 * at, number, order, bits: None }));
         }
         if let Some(address) = s.address {
-            let number =
-                s.number.ok_or_else(|| self.at(s.name.span(), format!("signal `{name}` needs `type`")))?;
+            let number = s.number.ok_or_else(|| wrong(format!("signal `{name}` needs `type`")))?;
             let wanted = Span { address, count: number.bytes().div_ceil(2) as u16 };
             let stands =
                 Self::within(&frame.spans, wanted).filter(|_| s.register.is_none() && s.byte.is_none());
             let at = stands.ok_or_else(|| {
                 let why = format!("`address` {address} of signal `{name}` is not read by `{}`", frame.name);
-                self.at(s.name.span(), why).with_help(
+                wrong(why).with_help(
                     "`address` is a register of a [[poll]], and takes the place of `register` and `byte`",
                 )
             })?;
@@ -484,37 +444,34 @@ impl Compiler<'_> {
                 "signal `{name}` needs `address`: poll `{}` names no registers of its own",
                 frame.name
             );
-            return Err(self.at(s.name.span(), why));
+            return Err(wrong(why));
         }
         let at = match (s.register, s.byte) {
             (None, None) if text_answer => 0,
             (Some(register), None) => 2 * usize::from(register),
             (None, Some(byte)) => usize::from(byte),
             _ => {
-                return Err(
-                    self.at(s.name.span(), format!("signal `{name}` needs either `register` or `byte`"))
-                );
+                return Err(wrong(format!("signal `{name}` needs either `register` or `byte`")));
             }
         };
         let number = if text_answer { Some(NumberType::F64) } else { s.number };
-        let number = number.ok_or_else(|| self.at(s.name.span(), format!("signal `{name}` needs `type`")))?;
+        let number = number.ok_or_else(|| wrong(format!("signal `{name}` needs `type`")))?;
         Ok(Place::Bytes(Field { at, number, order: s.byte_order, bits: s.bits }))
     }
 
     fn set(&self, s: &crate::schema::Set, sheet: &Objects) -> Result<CompiledSet, ProfileError> {
         let name = s.name.as_ref();
+        let wrong = |why: String| self.at_name(&s.name, why);
         if s.scale == 0.0 || !s.scale.is_finite() {
-            return Err(
-                self.at(s.name.span(), format!("the scale of set-point `{name}` is zero or not finite"))
-            );
+            return Err(wrong(format!("the scale of set-point `{name}` is zero or not finite")));
         }
         if s.range.is_some_and(|(low, high)| low > high || low.is_nan() || high.is_nan()) {
-            return Err(self.at(s.name.span(), format!("the range of set-point `{name}` is empty")));
+            return Err(wrong(format!("the range of set-point `{name}` is empty")));
         }
         let outside = |safe: f64| s.range.is_some_and(|(low, high)| safe < low || safe > high);
         if s.safe.is_some_and(outside) {
             let message = format!("the safe value of set-point `{name}` lies outside its range");
-            return Err(self.at(s.name.span(), message));
+            return Err(wrong(message));
         }
         if let Some(send) = &s.send {
             return Ok(CompiledSet { block: None, scale: s.scale, line: Some(self.sent_line(s, send)?) });
@@ -522,16 +479,15 @@ impl Compiler<'_> {
         let blocks = &self.description.write;
         let block = match &s.block {
             Some(block) => blocks.iter().position(|b| b.name.as_ref() == block).ok_or_else(|| {
-                self.at(s.name.span(), format!("the block of set-point `{name}`, `{block}`, does not exist"))
+                wrong(format!("the block of set-point `{name}`, `{block}`, does not exist"))
             })?,
             None if blocks.len() == 1 => 0,
-            None => return Err(self.at(s.name.span(), format!("set-point `{name}` needs `block` or `send`"))),
+            None => return Err(wrong(format!("set-point `{name}` needs `block` or `send`"))),
         };
         let field = if s.object.is_some() {
             self.mapped(s.object, 0x1400, blocks[block].cob, sheet, &s.name)?
         } else {
-            let number =
-                s.number.ok_or_else(|| self.at(s.name.span(), format!("set-point `{name}` needs `type`")))?;
+            let number = s.number.ok_or_else(|| wrong(format!("set-point `{name}` needs `type`")))?;
             Field { at: 2 * usize::from(s.register), number, order: s.byte_order, bits: None }
         };
         let number = field.number;
@@ -540,7 +496,7 @@ impl Compiler<'_> {
             let (least, most) = (number.limits().0 * s.scale, number.limits().1 * s.scale);
             if low < least.min(most) || high > least.max(most) {
                 let message = format!("the range of set-point `{name}` is more than its type can hold");
-                return Err(self.at(s.name.span(), message));
+                return Err(wrong(message));
             }
         }
         Ok(CompiledSet { block: Some((block, field)), scale: s.scale, line: None })
@@ -548,8 +504,7 @@ impl Compiler<'_> {
 
     /// A pattern of the file, its place the text itself.
     pub(super) fn pattern(&self, text: &str) -> Result<Pattern, ProfileError> {
-        let place = self.text.find(text).map(|at| at..at + text.len());
-        Pattern::parse(text).map_err(|why| ProfileError::at(self.text, place, why))
+        Pattern::parse(text).map_err(|why| self.at_text(text, why))
     }
 
     /// The line that carries a set-point, and whose values stand in it.
@@ -571,13 +526,13 @@ impl Compiler<'_> {
                     "`{{{field}}}` in the line of set-point `{}` is not a set-point of text",
                     s.name.as_ref()
                 );
-                self.at(s.name.span(), why)
+                self.at_name(&s.name, why)
             })
         };
         let owners = pattern.fields().map(owner).collect::<Result<Vec<_>, _>>()?;
         if !owners.is_empty() && !owners.contains(&None) {
             let why = format!("the line of set-point `{}` has no `{{}}` for its own value", s.name.as_ref());
-            return Err(self.at(s.name.span(), why));
+            return Err(self.at_name(&s.name, why));
         }
         Ok((pattern, owners))
     }

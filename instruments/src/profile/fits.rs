@@ -44,23 +44,15 @@ const FASTEST_HZ: f64 = 20_000.0;
 impl Compiler<'_> {
     pub(super) fn check_header(&self) -> Result<(), ProfileError> {
         let link = &self.description.link;
-        let place = self.text.find("[profile]").map(|at| at..at + "[profile]".len());
-        let link_place = self.text.find("[link]").map(|at| at..at + "[link]".len());
+        let wrong = |why: String| self.at_text("[profile]", why);
+        let wrong_link = |why: &str| Err(self.at_text("[link]", why));
         if self.description.profile.schema != 1 {
-            return Err(ProfileError::at(
-                self.text,
-                place,
-                format!("schema {} is not known", self.description.profile.schema),
-            )
-            .with_help("this version reads schema = 1"));
+            let why = format!("schema {} is not known", self.description.profile.schema);
+            return Err(wrong(why).with_help("this version reads schema = 1"));
         }
         let id = &self.description.profile.id;
         if id.is_empty() || !id.chars().all(|c| c.is_ascii_alphanumeric() || "-_.".contains(c)) {
-            return Err(ProfileError::at(
-                self.text,
-                place,
-                format!("`{id}` is not an id: letters, digits, `-`, `_` and `.`"),
-            ));
+            return Err(wrong(format!("`{id}` is not an id: letters, digits, `-`, `_` and `.`")));
         }
         let formed = |format: &String| {
             let [data, parity, stop] = format.as_bytes() else { return false };
@@ -70,22 +62,18 @@ impl Compiler<'_> {
             let problem = format!(
                 "`format`: `{format}` is none; data bits 7 or 8, parity N, E or O, stop bits 1 or 2, as 8N1"
             );
-            return Err(ProfileError::at(self.text, link_place, problem));
+            return wrong_link(&problem);
         }
         if link.baud == Some(0) || link.bitrate == Some(0) {
-            return Err(ProfileError::at(
-                self.text,
-                link_place,
-                "a line of no bits per second carries nothing",
-            ));
+            return wrong_link("a line of no bits per second carries nothing");
         }
         if matches!(link.kind, LinkKind::ModbusRtu | LinkKind::Serial)
             && (link.baud.is_none() || link.format.is_none())
         {
-            return Err(ProfileError::at(self.text, link_place, "a serial link needs `baud` and `format`"));
+            return wrong_link("a serial link needs `baud` and `format`");
         }
         if self.description.vector.is_empty() {
-            return Err(ProfileError::at(self.text, place, "the profile has no golden vector")
+            return Err(wrong("the profile has no golden vector".into())
                 .with_help("add a [[vector]] for every frame: bytes beside the values that they stand for"));
         }
         Ok(())
@@ -99,7 +87,7 @@ impl Compiler<'_> {
         let mut seen = std::collections::HashSet::new();
         for name in names {
             if !seen.insert(name.as_ref()) {
-                return Err(self.at(name.span(), format!("a second {what} is called `{}`", name.as_ref())));
+                return Err(self.at_name(name, format!("a second {what} is called `{}`", name.as_ref())));
             }
         }
         Ok(())
@@ -120,26 +108,25 @@ impl Compiler<'_> {
         for (section, used, kinds) in rows {
             if used && !kinds.contains(&d.link.kind) {
                 return Err(
-                    self.at_section(section, format!("a link of kind {:?} has no {section}", d.link.kind))
+                    self.at_text(section, format!("a link of kind {:?} has no {section}", d.link.kind))
                 );
             }
         }
         let text = matches!(d.link.kind, Serial | Tcp | Scpi);
         let words = d.link.error_query.is_some() || d.link.choice.is_some() || !d.link.unsolicited.is_empty();
         if words && !text {
-            return Err(self.at_section(
-                "[link]",
-                "`error_query`, `choice` and `unsolicited` are for lines of text".into(),
-            ));
+            return Err(
+                self.at_text("[link]", "`error_query`, `choice` and `unsolicited` are for lines of text")
+            );
         }
         for (key, file, kind) in [("dbc", &d.link.dbc, Can), ("eds", &d.link.eds, Canopen)] {
             if let Some(file) = file {
                 if d.link.kind != kind {
-                    return Err(self.at_section("[link]", format!("`{key}` is for a link of kind {kind:?}")));
+                    return Err(self.at_text("[link]", format!("`{key}` is for a link of kind {kind:?}")));
                 }
                 if file.contains(['/', '\\']) {
                     return Err(
-                        self.at_section("[link]", format!("`{key}`: the file stands beside the profile"))
+                        self.at_text("[link]", format!("`{key}`: the file stands beside the profile"))
                     );
                 }
             }
@@ -156,7 +143,7 @@ impl Compiler<'_> {
         for alarm in &d.link.unsolicited {
             if self.pattern(alarm)?.head().is_empty() {
                 let problem = format!("the alarm `{alarm}` must begin with text of its own");
-                return Err(self.at_section("[link]", problem));
+                return Err(self.at_text("[link]", problem));
             }
         }
         let rates = d
@@ -167,7 +154,7 @@ impl Compiler<'_> {
         for (name, rate) in rates {
             if !(rate > 0.0 && rate <= FASTEST_HZ) {
                 let problem = format!("`{}`: a `rate_hz` is above 0 and at most {FASTEST_HZ}", name.as_ref());
-                return Err(self.at(name.span(), problem));
+                return Err(self.at_name(name, problem));
             }
         }
         for query in &d.query {
@@ -175,17 +162,13 @@ impl Compiler<'_> {
             if d.link.kind == Sysfs && (name.is_empty() || name.starts_with('.') || name.contains(['/', ' ']))
             {
                 let problem = format!("query `{}`: `{name}` is no name of an attribute", query.name.as_ref());
-                return Err(self.at(query.name.span(), problem));
+                return Err(self.at_name(&query.name, problem));
             }
-            if [query.length.is_some(), query.unit.is_some(), query.answer.is_some()]
-                .iter()
-                .filter(|x| **x)
-                .count()
-                > 1
-            {
+            let forms = [query.length.is_some(), query.unit.is_some(), query.answer.is_some()];
+            if forms.iter().filter(|x| **x).count() > 1 {
                 let problem =
                     format!("query `{}` takes one of `length`, `unit` and `answer`", query.name.as_ref());
-                return Err(self.at(query.name.span(), problem));
+                return Err(self.at_name(&query.name, problem));
             }
         }
         if let Some(set) = d.set.iter().find(|set| text != set.send.is_some()) {
@@ -194,7 +177,7 @@ impl Compiler<'_> {
             } else {
                 "has `send`, and no lines to send"
             };
-            return Err(self.at(set.name.span(), format!("set-point `{}` {problem}", set.name.as_ref())));
+            return Err(self.at_name(&set.name, format!("set-point `{}` {problem}", set.name.as_ref())));
         }
         self.check_roles()
     }
@@ -204,7 +187,7 @@ impl Compiler<'_> {
         let d = self.description;
         if d.link.kind != LinkKind::Udp {
             return match d.link.local_port {
-                Some(_) => Err(self.at_section("[link]", "`local_port` is for a link of kind Udp".into())),
+                Some(_) => Err(self.at_text("[link]", "`local_port` is for a link of kind Udp")),
                 None => Ok(()),
             };
         }
@@ -215,7 +198,7 @@ impl Compiler<'_> {
         } else {
             return Ok(());
         };
-        Err(self.at_section("[link]", problem.into()))
+        Err(self.at_text("[link]", problem))
     }
 
     /// Modbus RTU has no transaction number: an answer that comes late to one of two requests that
@@ -232,7 +215,7 @@ impl Compiler<'_> {
                 if seen.contains(&(poll.table, span.count)) {
                     let problem =
                         format!("poll `{}` reads the same number of registers as a read before", frame.name);
-                    return Err(self.at(poll.name.span(), problem).with_help(
+                    return Err(self.at_name(&poll.name, problem).with_help(
                         "over RTU a late answer to one would be taken for the other's; read one register more, or raise `gap`",
                     ));
                 }
@@ -279,7 +262,7 @@ impl Compiler<'_> {
             [(act, ..)] => format!("a link of kind {kind:?} has no `{act}`"),
             _ => "does one thing: send, hex, can, function, copy, registers or sdo".to_string(),
         };
-        Err(self.at_section("[[init]]", format!("an [[init]]: {problem}")))
+        Err(self.at_text("[[init]]", format!("an [[init]]: {problem}")))
     }
 
     fn check_roles(&self) -> Result<(), ProfileError> {
@@ -287,13 +270,11 @@ impl Compiler<'_> {
         let signal = |name: &str| d.signal.iter().any(|signal| signal.name.as_ref() == name);
         let set = |name: &str| d.set.iter().find(|set| set.name.as_ref() == name);
         if d.profile.roles.is_empty() {
-            return Err(
-                self.at_section("[profile]", "`roles` is empty: say what the instrument can be".into())
-            );
+            return Err(self.at_text("[profile]", "`roles` is empty: say what the instrument can be"));
         }
         for role in &d.profile.roles {
             let problem = |what: String| {
-                Err(self.at_section("[profile]", format!("an instrument of role {role:?} needs {what}")))
+                Err(self.at_text("[profile]", format!("an instrument of role {role:?} needs {what}")))
             };
             let row = NEEDS.iter().find(|(named, ..)| named == role);
             let (signals, sets) = row.map_or((&[][..], &[][..]), |(_, signals, sets)| (*signals, *sets));
@@ -326,7 +307,7 @@ impl Compiler<'_> {
             None => Ok(()),
             Some(set) => {
                 let problem = "`timeout_ms` is above zero, and belongs to the set-point `heartbeat`";
-                Err(self.at(set.name.span(), problem))
+                Err(self.at_name(&set.name, problem))
             }
         }
     }
@@ -348,36 +329,24 @@ impl Compiler<'_> {
                     "nobody would send the set-point `{}`; its roles have: {names}",
                     set.name.as_ref()
                 );
-                Err(self.at(set.name.span(), problem).with_help("what is done once goes into an [[init]]"))
+                Err(self.at_name(&set.name, problem).with_help("what is done once goes into an [[init]]"))
             }
         }
-    }
-
-    fn at_section(&self, section: &str, message: String) -> ProfileError {
-        let place = self.text.find(section).map(|at| at..at + section.len());
-        ProfileError::at(self.text, place, message)
     }
 
     pub(super) fn check_emulator(&self, index: &dyn Fn(&str) -> Option<usize>) -> Result<(), ProfileError> {
         let emulator = &self.description.emulator;
-        let place = self.text.find("[emulator").map(|at| at..at + "[emulator".len());
-        for name in emulator.measure.keys().chain(emulator.constant.keys()) {
-            if index(name).is_none() {
-                return Err(ProfileError::at(
-                    self.text,
-                    place,
-                    format!("[emulator] speaks of `{name}`, which is not a signal"),
-                ));
-            }
+        let wrong = |name: &str, what| {
+            self.at_text("[emulator", format!("[emulator] speaks of `{name}`, which is not a {what}"))
+        };
+        if let Some(name) =
+            emulator.measure.keys().chain(emulator.constant.keys()).find(|name| index(name).is_none())
+        {
+            return Err(wrong(name, "signal"));
         }
-        for name in emulator.command.keys() {
-            if !self.description.set.iter().any(|set| set.name.as_ref() == name) {
-                return Err(ProfileError::at(
-                    self.text,
-                    place,
-                    format!("[emulator] speaks of `{name}`, which is not a set-point"),
-                ));
-            }
+        let is_set = |name: &&String| self.description.set.iter().any(|set| set.name.as_ref() == *name);
+        if let Some(name) = emulator.command.keys().find(|name| !is_set(name)) {
+            return Err(wrong(name, "set-point"));
         }
         Ok(())
     }

@@ -24,6 +24,12 @@ pub struct Frame {
 }
 
 impl Frame {
+    /// A frame of registers or bytes without time, counter and text.
+    pub(super) fn new(name: &str, bytes: usize, kind: FrameKind) -> Frame {
+        let name = name.to_owned();
+        Frame { name, bytes, sequence: None, device_time: None, kind, spans: Vec::new(), text: None }
+    }
+
     /// The bytes of a line of text; `None` where it is no such line.
     pub fn read_line(&self, line: &str) -> Option<Vec<u8>> {
         let numbers = self.text.as_ref()?.read(line)?;

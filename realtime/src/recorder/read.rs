@@ -449,5 +449,3 @@ impl<R: Read + Seek> Iterator for Reader<R> {
 
 #[cfg(test)]
 mod tests;
-#[cfg(test)]
-mod work;

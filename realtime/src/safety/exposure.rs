@@ -12,7 +12,6 @@ pub const MINUTES: usize = 61;
 /// ns in a minute.
 pub const MINUTE_NS: u64 = 60_000_000_000;
 
-/// What a minute held.
 #[derive(Clone, Copy, Debug)]
 struct Minute {
     /// Its number.

@@ -16,7 +16,6 @@ use std::time::Duration;
 use tables::export::topics::SIGNALS;
 use tables::export::unit;
 
-/// The type of the answer.
 const TYPE: &str = "application/openmetrics-text; version=1.0.0; charset=utf-8";
 /// A first scrape waits so often and so long for the run so far.
 const PAUSES: u32 = 20;
@@ -128,7 +127,6 @@ impl Text<'_> {
     }
 }
 
-/// What is of this server.
 fn server(text: &mut Text<'_>, shared: &Shared) {
     text.family("build", "info", None, "the program");
     let _ = writeln!(text.out, "muprime_build_info{{version=\"{}\"}} 1", env!("CARGO_PKG_VERSION"));

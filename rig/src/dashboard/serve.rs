@@ -17,7 +17,6 @@ const TAKEN_WITHIN: Duration = Duration::from_secs(5);
 /// Time after which a connection gets no further request, and what the last answer may take after that. A live stream is none of these.
 const WHOLE_WITHIN: Duration = Duration::from_secs(30);
 const LAST_ANSWER_WITHIN: Duration = Duration::from_secs(10);
-/// Largest head of a request in bytes.
 const HEAD_BYTES: usize = 16 * 1024;
 /// What the system may hold for one that reads slowly, in bytes (it takes twice as much): with its own bound of some megabytes a slow
 /// page would show what was minutes ago, and states could not be left out for it.

@@ -11,9 +11,6 @@ pub struct Dashboard {
 
 impl Dashboard {
     /// Refuses: built without a dashboard.
-    ///
-    /// # Errors
-    /// Always.
     pub fn start(_: Options) -> miette::Result<Self> {
         Err(tables::built_without("dashboard", "use `muprime watch`"))
     }

@@ -225,7 +225,6 @@ fn saturated(c: &ChannelReport, problems: &mut Vec<Problem>) {
     }
 }
 
-/// What the link lost.
 fn linked(answers: &Answers, problems: &mut Vec<Problem>) {
     if answers.bad_share > BAD_SHARE {
         problems.push((format!("{:.0} % of its answers are none", answers.bad_share * 1e2), LINK));

@@ -8,9 +8,6 @@ pub enum Publisher {}
 
 impl Publisher {
     /// Refuses: built without MQTT.
-    ///
-    /// # Errors
-    /// Always.
     pub fn start(_: &Broker) -> miette::Result<Self> {
         Err(tables::built_without("mqtt", "leave out --publish"))
     }

@@ -14,7 +14,6 @@ use std::sync::atomic::{AtomicBool, Ordering};
 use std::sync::mpsc::{Receiver, RecvTimeoutError};
 use std::time::{Duration, Instant};
 
-/// Flush of the record.
 const FLUSH_EVERY: Duration = Duration::from_millis(50);
 /// Sync of the record to the disk.
 const SYNC_EVERY: Duration = Duration::from_secs(1);

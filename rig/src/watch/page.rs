@@ -16,7 +16,6 @@ use runs::sequence::Outcome;
 
 /// Columns and rows from which on the whole page is shown.
 const WHOLE: [u16; 2] = [80, 24];
-/// Columns of the numbers.
 const NUMBERS: u16 = 39;
 /// A feed sends ten states a second; after so many seconds without any the page warns.
 const SILENT_S: f64 = 2.0;

@@ -11,7 +11,6 @@ const LAST_S: f64 = 60.0;
 /// Dots of a cell of braille: columns and rows.
 const DOTS: [usize; 2] = [2, 4];
 
-/// A field of dots.
 struct Dots {
     cells: [usize; 2],
     set: Vec<bool>,

@@ -118,7 +118,6 @@ fn planned(folder: &Path) -> Option<usize> {
     begun.or_else(|| Some(summary(folder)?.planned))
 }
 
-/// What a run is of, from its record.
 fn run_of(folder: &Path) -> Option<Run> {
     let mut facts = run_dir::record_facts(folder).ok()?;
     let mut fact = |name: &str| facts.remove(name);

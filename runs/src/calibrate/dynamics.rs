@@ -2,8 +2,8 @@
 
 use super::tables::{Sources, columns};
 use super::{Common, Issued};
-use calibration::certificate::Residuals;
-use calibration::force::characteristics::{Finding, outcome};
+use calibration::certificate::{Finding, Residuals};
+use calibration::force::characteristics::outcome;
 use calibration::force::dynamics::{Estimate, ring_down, step_response};
 use calibration::uncertainty::Input;
 use std::path::PathBuf;
@@ -94,11 +94,11 @@ fn run(
         .enumerate()
         .map(|(k, (name, unit))| match events.as_slice() {
             // Both models have five parameters.
-            [one] => Finding::new(*name, unit, one.found[k], one.samples as f64 - 5.0),
+            [one] => Finding::new(*name, *unit, one.found[k], one.samples as f64 - 5.0),
             all => {
                 let values: Vec<f64> = all.iter().map(|e| e.found[k][0]).collect();
                 let mean = Input::type_a(name, &values);
-                Finding::new(*name, unit, [mean.value, mean.standard_uncertainty], mean.degrees_of_freedom)
+                Finding::new(*name, *unit, [mean.value, mean.standard_uncertainty], mean.degrees_of_freedom)
             }
         })
         .collect();

@@ -2,8 +2,8 @@
 
 use super::tables::{Sources, columns};
 use super::{Common, Issued};
-use calibration::certificate::Residuals;
-use calibration::force::characteristics::{Finding, outcome};
+use calibration::certificate::{Finding, Residuals};
+use calibration::force::characteristics::outcome;
 use calibration::force::gravity::{TiltReading, orientation};
 use std::path::PathBuf;
 

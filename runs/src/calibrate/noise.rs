@@ -2,8 +2,8 @@
 
 use super::tables::{Sources, columns};
 use super::{Common, Issued};
-use calibration::certificate::Residuals;
-use calibration::force::characteristics::{Finding, outcome};
+use calibration::certificate::{Finding, Residuals};
+use calibration::force::characteristics::outcome;
 use calibration::force::noise::{
     EqualSamples, Spectrum, integrated_autocorrelation_time, mean_with_uncertainty,
     probability_of_equal_samples, quantum,

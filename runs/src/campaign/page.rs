@@ -18,9 +18,6 @@ use std::fmt::Write;
 const CURVE: u32 = 40;
 
 /// The page of a campaign as HTML, and the answers on it.
-///
-/// # Errors
-/// Only if the drawing library fails.
 pub fn page(file: &CampaignFile, made: &[Measured]) -> miette::Result<(String, Vec<Claim>)> {
     let claims = claims(made, file.margin);
     let planned = sessions(file).len();

@@ -106,7 +106,6 @@ pub struct Grouped {
     pub warnings: Vec<String>,
 }
 
-/// A run that was read.
 struct Read {
     data: RunData,
     noise: PassNoise,

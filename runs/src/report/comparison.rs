@@ -1,15 +1,12 @@
 //! The page of two runs side by side.
 
-use super::html::{escape, glossary, list, note, shell, table};
+use super::html::{column, columns, escape, glossary, list, note, shell, table};
 use super::plots;
 use crate::compare::{Answer, Compared, Comparison, Mean, Paired};
 use std::fmt::Write;
 use std::path::Path;
 
 /// The page.
-///
-/// # Errors
-/// Only if the drawing library fails.
 pub fn page(compared: &Compared) -> miette::Result<String> {
     let result = &compared.comparison;
     let name = |run: &Path| {
@@ -81,8 +78,7 @@ fn about(compared: &Compared, a: &str, b: &str) -> String {
             format!("<tr><th scope=\"row\">{}</th>{cells}</tr>\n", escape(name))
         })
         .collect();
-    let head =
-        format!("<th scope=\"col\">of the run</th><th scope=\"col\">{a}</th><th scope=\"col\">{b}</th>");
+    let head = ["of the run", a, b].map(column).concat();
     table("Both runs", &head, &rows)
 }
 
@@ -90,19 +86,8 @@ fn about(compared: &Compared, a: &str, b: &str) -> String {
 const STANDS_OUT: f64 = 3.0;
 
 fn pairs(result: &Comparison) -> String {
-    let column = |name: &str| format!("<th scope=\"col\" class=\"n\">{name}</th>");
-    let head: String = [
-        "w, \u{b5}m",
-        "f, kHz",
-        "U, mm/s",
-        "load, N",
-        "\u{3bc}' first",
-        "\u{3bc}' second",
-        "difference",
-        "in sd",
-    ]
-    .map(column)
-    .concat();
+    let head =
+        columns("#w, \u{b5}m|#f, kHz|#U, mm/s|#load, N|#\u{3bc}' first|#\u{3bc}' second|#difference|#in sd");
     let single = result.pairs.iter().all(|p| p.a.passes == 1 && p.b.passes == 1);
     let mean = |m: &Mean| match single {
         true => format!("{:.3}", m.mu_relative),
@@ -153,6 +138,6 @@ fn differences(compared: &Compared) -> String {
             )
         })
         .collect();
-    let head = "<th scope=\"col\">what</th><th scope=\"col\">first run</th><th scope=\"col\">second run</th>";
-    format!("<h2>What differed</h2>{}", table("What differed", head, &rows))
+    let head = columns("what|first run|second run");
+    format!("<h2>What differed</h2>{}", table("What differed", &head, &rows))
 }

@@ -10,7 +10,7 @@ mod overlay;
 mod passes;
 mod timing;
 
-use super::html::{bar, escape, glossary, head, list, note, shell, table};
+use super::html::{bar, columns, escape, glossary, head, list, note, shell, table};
 use super::human::number;
 use super::plots::beyond;
 use super::plots::verdict::{Seen, errors_against};
@@ -26,9 +26,6 @@ use models::covariate;
 const LISTED_REGIONS: usize = 3;
 
 /// The page; `about` is what is known of the table's run, and stands first.
-///
-/// # Errors
-/// Only if the drawing library fails.
 pub fn page(result: &Diagnosis, table: &Table, about: &[(&str, String)]) -> miette::Result<String> {
     let r = &result.report;
     let forecasts = result.predict(table);
@@ -102,10 +99,10 @@ fn how_far(result: &Diagnosis) -> String {
         _ => "The recalibrated baseline is within its own sampling error of repeatability: no gap to shrink."
             .to_string(),
     };
-    let columns = "<th scope=\"col\">left by</th><th scope=\"col\" class=\"n\">error</th><td></td>";
+    let head = columns("left by|#error|");
     format!(
         "<h2>How far the gap shrinks</h2><p>{words}</p>{}{}",
-        table("Errors on held-out passes", columns, &rows),
+        table("Errors on held-out passes", &head, &rows),
         note("Root mean square error on held-out passes, in units of full friction \u{3bc}0 Fn.")
     )
 }
@@ -171,9 +168,8 @@ fn uncertain(result: &Diagnosis) -> String {
                 )
             })
             .collect();
-        let head = "<th scope=\"col\">point</th><th scope=\"col\" class=\"n\">off by</th><th scope=\"col\" class=\"n\">deviations</th>\
-                    <th scope=\"col\" class=\"n\">probability not to belong</th>";
-        text += &format!("<h3>Suspect passes</h3>{}", table("Suspect passes", head, &rows));
+        let head = columns("point|#off by|#deviations|#probability not to belong");
+        text += &format!("<h3>Suspect passes</h3>{}", table("Suspect passes", &head, &rows));
         if let Some(with) = &r.with_suspects {
             let name =
                 if with.effects.is_empty() { "no gap".into() } else { plain(&with.effects.join(" + ")) };

@@ -1,6 +1,6 @@
 //! What happened during a run, in words: for the terminal and for the page.
 
-use super::html::{escape, table};
+use super::html::{columns, escape, table};
 use super::human::number;
 use crate::ambient::AIR;
 use crate::sequence::Event;
@@ -144,10 +144,7 @@ pub(super) fn section(events: &[(f64, serde_json::Value)]) -> String {
         format!("<tr><td class=\"n\">{at:.3}</td><td>{words}</td></tr>\n")
     };
     let rows: String = events.iter().map(row).collect();
-    format!(
-        "<h2>Events</h2>{}",
-        table("Events", "<th scope=\"col\" class=\"n\">time, s</th><th scope=\"col\">event</th>", &rows)
-    )
+    format!("<h2>Events</h2>{}", table("Events", &columns("#time, s|event"), &rows))
 }
 
 /// A document as `key value` pairs, its numbers with three digits.

@@ -1,15 +1,12 @@
 //! The page of more than two runs: their groups on one figure, and the differences at each condition.
 
 use super::explore::script;
-use super::html::{escape, glossary, list, note, shell, table};
+use super::html::{column, columns, escape, glossary, list, note, shell, table};
 use super::plots::comparison::{group_differences, group_overlay};
 use crate::compare::groups::{AtCondition, GroupBy, Grouped};
 use std::fmt::Write;
 
 /// The page.
-///
-/// # Errors
-/// Only if the drawing library fails.
 pub fn page(compared: &Grouped) -> miette::Result<String> {
     let runs: usize = compared.groups.iter().map(|g| g.runs.len()).sum();
     let title = match compared.by {
@@ -62,15 +59,14 @@ fn groups(compared: &Grouped) -> String {
         )
     };
     let rows: String = compared.groups.iter().map(row).collect();
-    let head = "<th scope=\"col\">group</th><th scope=\"col\" class=\"n\">runs</th><th scope=\"col\">folders (\u{3bc}<sub>0</sub>)</th>";
-    table("Groups", head, &rows)
+    let head = columns("group|#runs|folders (\u{3bc}<sub>0</sub>)");
+    table("Groups", &head, &rows)
 }
 
 fn conditions(compared: &Grouped) -> String {
-    let column = |name: &str| format!("<th scope=\"col\" class=\"n\">{name}</th>");
-    let mut head = ["w, \u{b5}m", "f, kHz", "U, mm/s", "load, N"].map(column).concat();
-    head += &compared.groups.iter().map(|g| column(&escape(&g.name))).collect::<String>();
-    let less = |g: &crate::compare::groups::Group| column(&format!("{} less first", escape(&g.name)));
+    let mut head = columns("#w, \u{b5}m|#f, kHz|#U, mm/s|#load, N");
+    head += &compared.groups.iter().map(|g| column(&format!("#{}", escape(&g.name)))).collect::<String>();
+    let less = |g: &crate::compare::groups::Group| column(&format!("#{} less first", escape(&g.name)));
     head += &compared.groups[1..].iter().map(less).collect::<String>();
     let row = |c: &AtCondition| {
         let mut cells = format!(

@@ -60,6 +60,20 @@ pub fn list(items: impl IntoIterator<Item = impl Display>, none: &str) -> String
     if items.is_empty() { format!("<p>{}</p>", escape(none)) } else { format!("<ul>{items}</ul>") }
 }
 
+/// The head of a column, HTML already. One that begins with `#` is over numbers; an empty one is no head.
+pub fn column(title: &str) -> String {
+    match (title.strip_prefix('#'), title) {
+        (Some(title), _) => format!("<th scope=\"col\" class=\"n\">{title}</th>"),
+        (None, "") => "<td></td>".into(),
+        (None, title) => format!("<th scope=\"col\">{title}</th>"),
+    }
+}
+
+/// The heads of columns, with `|` between them.
+pub fn columns(titles: &str) -> String {
+    titles.split('|').map(column).collect()
+}
+
 /// A table that scrolls by itself where the page is narrower, also by the keyboard. Head and rows are HTML already.
 pub fn table(label: &str, head: &str, rows: &str) -> String {
     format!(

@@ -18,7 +18,6 @@ const SHOWN: [(&str, &[(f64, &str)]); 14] = [
     ("Hz", &[(1e-3, "kHz"), (1.0, "Hz")]),
 ];
 
-/// Superscripts of an exponent.
 fn raised(exponent: i32) -> String {
     let digits = exponent.abs().to_string();
     let up = |c: char| {

@@ -1,7 +1,7 @@
 //! The page: words and tables around the figures.
 
 use super::RunData;
-use super::html::{escape, glossary, head, note, shell, table};
+use super::html::{columns, escape, glossary, head, note, shell, table};
 use super::human::number;
 use super::published::Published;
 use super::traces::Trace;
@@ -133,10 +133,8 @@ fn levels(run: &RunData) -> String {
         )
     };
     let rows: String = found.iter().map(row).collect();
-    let head = "<th scope=\"col\">quantity</th><th scope=\"col\">unit</th><th scope=\"col\">planned</th>\
-        <th scope=\"col\">found</th><th scope=\"col\">range</th><th scope=\"col\">how</th>\
-        <th scope=\"col\">oldest reading, s</th><th scope=\"col\">passes</th><th scope=\"col\">level lost</th>";
-    format!("<h2>Air and protocol</h2>{}", table("Air and protocol", head, &rows))
+    let head = columns("quantity|unit|planned|found|range|how|oldest reading, s|passes|level lost");
+    format!("<h2>Air and protocol</h2>{}", table("Air and protocol", &head, &rows))
 }
 
 fn timing(w: &mut String, run: &RunData) -> miette::Result<()> {
@@ -175,10 +173,9 @@ fn timing(w: &mut String, run: &RunData) -> miette::Result<()> {
 }
 
 fn passes(w: &mut String, run: &RunData) {
-    const HEAD: &str = "<th scope=\"col\">pass</th><th scope=\"col\">w, &micro;m</th><th scope=\"col\">f, kHz</th><th scope=\"col\">U, mm/s</th>\
-         <th scope=\"col\">direction</th><th scope=\"col\">load, N</th><th scope=\"col\">lateral force, N</th><th scope=\"col\">&mu;'</th>\
-         <th scope=\"col\">&plusmn;</th><th scope=\"col\">predicted</th><th scope=\"col\">&plusmn;</th><th scope=\"col\">difference</th>\
-         <th scope=\"col\">surprise, sd</th>";
+    let head = columns(
+        "pass|w, &micro;m|f, kHz|U, mm/s|direction|load, N|lateral force, N|&mu;'|&plusmn;|predicted|&plusmn;|difference|surprise, sd",
+    );
     let mut rows = String::new();
     for p in &run.passes {
         let c = p.comparison;
@@ -206,7 +203,7 @@ fn passes(w: &mut String, run: &RunData) {
             signed(c.map(|c| c.z), 1),
         );
     }
-    let all = table("All passes", HEAD, &rows).replacen("<table>", "<table class=\"nums\">", 1);
+    let all = table("All passes", &head, &rows).replacen("<table>", "<table class=\"nums\">", 1);
     let _ = writeln!(
         w,
         "<details><summary>All {} passes</summary>{}{all}</details>",
@@ -224,6 +221,6 @@ fn facts(w: &mut String, run: &RunData) {
         format!("<tr><th scope=\"row\">{}</th><td><code>{}</code></td></tr>\n", escape(name), escape(value))
     };
     let rows: String = run.facts.iter().map(row).collect();
-    let all = table("The record", "<th scope=\"col\">fact</th><th scope=\"col\">value</th>", &rows);
+    let all = table("The record", &columns("fact|value"), &rows);
     let _ = writeln!(w, "<details><summary>The record</summary>{all}</details>");
 }

@@ -1,6 +1,6 @@
 //! The figures, as SVG text: what all of them share. Each is drawn twice, wide for a page and narrow for a
 //! telephone, with its own letters in both; the page shows one of them. Series differ by mark and dash as
-//! well as by colour.
+//! well as by colour. An error of a figure is one of the drawing library.
 
 pub mod campaign;
 pub mod comparison;
@@ -38,6 +38,11 @@ const PANEL: (u32, u32) = (400, 280);
 
 fn wrong(e: impl std::fmt::Display) -> miette::Report {
     miette::miette!("a figure: {e}")
+}
+
+fn capital(word: &str) -> String {
+    let mut letters = word.chars();
+    letters.next().map_or(String::new(), |first| first.to_uppercase().collect::<String>() + letters.as_str())
 }
 
 /// One axis from end to end.

@@ -2,7 +2,7 @@
 //! user's file, each with its source.
 
 use super::RunData;
-use super::html::{escape, note, table};
+use super::html::{columns, escape, note, table};
 use super::human::number;
 use super::plots::published::panels;
 use crate::input::{MAX_TABLE_BYTES, bytes_of};
@@ -132,9 +132,6 @@ fn parse(bytes: &[u8], name: &str) -> miette::Result<Vec<Published>> {
 
 /// The section: the run's passes with the published values against amplitude, frequency and speed, and all of
 /// them in a table.
-///
-/// # Errors
-/// Only if the drawing library fails.
 pub fn section(run: &RunData, all: &[Published]) -> miette::Result<String> {
     if all.is_empty() {
         return Ok(String::new());
@@ -166,8 +163,7 @@ pub fn section(run: &RunData, all: &[Published]) -> miette::Result<String> {
         )
     };
     let rows: String = all.iter().map(row).collect();
-    let column = |name: &str| format!("<th scope=\"col\" class=\"n\">{name}</th>");
-    let head = ["w, \u{b5}m", "f, kHz", "U, mm/s", "load, N", "\u{3bc}'", "\u{3a8}*"].map(column).concat();
+    let head = columns("source|what|#w, \u{b5}m|#f, kHz|#U, mm/s|#load, N|#\u{3bc}'|#\u{3a8}*");
     let text = if all.iter().any(|one| one.of_paper) {
         note(
             "From the paper: what its text states (Vezzoli et al., part 1), each number with its section. Its figures were not digitised, \
@@ -179,11 +175,7 @@ pub fn section(run: &RunData, all: &[Published]) -> miette::Result<String> {
     Ok(format!(
         "<h2>Published values</h2>{}{text}{}",
         panels(run, all)?,
-        table(
-            "Published values",
-            &format!("<th scope=\"col\">source</th><th scope=\"col\">what</th>{head}"),
-            &rows
-        )
+        table("Published values", &head, &rows)
     ))
 }
 

@@ -46,15 +46,23 @@ enum Task {
 #[derive(Clone, Copy, Debug, PartialEq)]
 enum Wait {
     /// The rig to be read back off.
-    Off { since: Nanos },
+    Off {
+        since: Nanos,
+    },
     /// The next task.
     Begin,
-    /// An answer.
-    Answer { since: Nanos },
+    Answer {
+        since: Nanos,
+    },
     /// A level, and since when it is within its tolerance.
-    There { since: Nanos, within: Option<Nanos> },
-    /// A timer.
-    Timer { since: Nanos, until: Nanos },
+    There {
+        since: Nanos,
+        within: Option<Nanos>,
+    },
+    Timer {
+        since: Nanos,
+        until: Nanos,
+    },
 }
 
 /// What comes once everything was waited for.

@@ -1,5 +1,5 @@
 //! Writes what a sweep yields: record, point table, summary, report. It runs beside the loop, so it may touch
-//! files.
+//! files; its errors are theirs.
 #![allow(clippy::disallowed_methods, reason = "a run says when it began")]
 
 use super::{Job, Notes, Summary, Unfinished, Update};
@@ -119,18 +119,12 @@ pub fn preamble(job: &Job, start_unix_ns: u64) -> miette::Result<Preamble> {
 
 impl Keeper {
     /// Begins a session of the run.
-    ///
-    /// # Errors
-    /// Whatever the file system says.
     pub fn begin(job: &Job, mut dir: RunDir, planned: usize) -> miette::Result<Self> {
         dir.begin().and_then(|()| Self::of(job, dir, planned)).wrap_err(Unfinished::NotKept)
     }
 
     /// The end of a run whose passes were all made in earlier sessions: nothing is driven. What an earlier
     /// session wrote at its end stays; where none came so far, it is written now.
-    ///
-    /// # Errors
-    /// Whatever the file system says.
     pub fn finish(
         job: &Job,
         mut dir: RunDir,
@@ -235,18 +229,12 @@ impl Keeper {
     }
 
     /// A new record file of the run.
-    ///
-    /// # Errors
-    /// Whatever the file system says.
     pub fn new_record(&self) -> miette::Result<Placed> {
         self.dir.new_record().wrap_err(Unfinished::NotKept)
     }
 }
 
 /// Writes what a row led to into a record.
-///
-/// # Errors
-/// Whatever the file says.
 pub fn record<W: std::io::Write>(
     recorder: &mut realtime::recorder::Recorder<W>,
     at: Nanos,

@@ -28,7 +28,6 @@ const LEAD_S: f64 = 0.06;
 const BEHIND: Nanos = Nanos(500_000_000);
 const LEAST: Nanos = Nanos(100_000_000);
 
-/// What was commanded.
 #[derive(Clone, Copy, PartialEq)]
 struct Commanded {
     amplitude_pp_m: f64,

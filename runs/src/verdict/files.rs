@@ -45,9 +45,6 @@ pub fn diagnose_run(run: &Path) -> miette::Result<()> {
 
 /// Writes a verdict into the folder of its run. A model or a plan of an earlier verdict goes where this
 /// one has none.
-///
-/// # Errors
-/// Whatever the file system says.
 pub fn write(
     run: &Path,
     result: &Diagnosis,

@@ -13,7 +13,6 @@ use super::{Contact, Steady};
 
 /// Width of a cell in the logarithm of each variable.
 pub const CELL: f64 = 0.02;
-/// Cells remembered.
 const CELLS: usize = 1024;
 /// Variables with a slope.
 const SLOPES: usize = 4;

@@ -2,11 +2,9 @@
 
 use super::*;
 
-pub(super) static KIND: Kind = Kind {
+pub(super) const KIND: Kind = Kind {
     act: Act::Setup(|_, config| config.amplifier.refuses_off = true),
-    ..Kind::fault(
-        "amplifier_refuses_off",
-        Place::Plate,
+    ..Kind::fault(Place::Plate,
         "the amplifier ignores its enable input once its output is on",
     )
 };

@@ -2,7 +2,7 @@
 
 use super::*;
 
-pub(super) static KIND: Kind = Kind {
+pub(super) const KIND: Kind = Kind {
     act: Act::Setup(|_, config| config.amplifier.watchdog_s = 1e9),
-    ..Kind::fault("amplifier_without_watchdog", Place::Plate, "the amplifier's own watchdog does not act")
+    ..Kind::fault(Place::Plate, "the amplifier's own watchdog does not act")
 };

@@ -2,11 +2,9 @@
 
 use super::*;
 
-pub(super) static KIND: Kind = Kind {
+pub(super) const KIND: Kind = Kind {
     act: Act::Setup(|_, config| config.room.chamber.stuck = true),
-    ..Kind::fault(
-        "chamber_stuck",
-        Place::Instrument,
+    ..Kind::fault(Place::Instrument,
         "the chamber takes set-points and leaves the air as it is",
     )
 };

@@ -2,13 +2,11 @@
 
 use super::*;
 
-pub(super) static KIND: Kind = Kind {
+pub(super) const KIND: Kind = Kind {
     parameters: &[Parameter::log("strength", 0.02, 1.0), Parameter::log("resonance_hz", 3e4, 5e4)],
     in_library: false,
     act: Act::Contact(act),
-    ..Kind::cause(
-        "lateral_resonance",
-        Place::Finger,
+    ..Kind::cause(Place::Finger,
         "the lateral stiffness of the ridges depends on frequency as a resonance does",
     )
 };

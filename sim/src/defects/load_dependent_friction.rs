@@ -4,12 +4,10 @@
 
 use super::*;
 
-pub(super) static KIND: Kind = Kind {
+pub(super) const KIND: Kind = Kind {
     parameters: &[Parameter::log("area_share", 0.01, 0.95)],
     act: Act::Contact(act),
-    ..Kind::cause(
-        "load_dependent_friction",
-        Place::Contact,
+    ..Kind::cause(Place::Contact,
         "part of the friction limit grows as the 2/3 power of the force",
     )
 };

@@ -4,7 +4,7 @@
 
 use super::*;
 
-pub(super) static KIND: Kind = Kind {
+pub(super) const KIND: Kind = Kind {
     parameters: &[
         Parameter::log("depth", 0.01, 0.95),
         Parameter::linear("phase_rad", 0.0, 3.1),
@@ -12,7 +12,7 @@ pub(super) static KIND: Kind = Kind {
         Parameter::linear("edge_over_wave", 0.1, 0.4),
     ],
     act: Act::Plate(act),
-    ..Kind::cause("mode_shape", Place::Plate, "the amplitude depends on the position along the plate")
+    ..Kind::cause(Place::Plate, "the amplitude depends on the position along the plate")
 };
 
 /// Distance of the driven edge from the middle of the stroke (m).

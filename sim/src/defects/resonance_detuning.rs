@@ -4,7 +4,7 @@
 
 use super::*;
 
-pub(super) static KIND: Kind = Kind {
+pub(super) const KIND: Kind = Kind {
     parameters: &[
         Parameter::log("relative_shift_per_k", 1e-5, 4e-3),
         Parameter::linear("softening_per_um2", 0.0, 2e-4),
@@ -12,7 +12,7 @@ pub(super) static KIND: Kind = Kind {
         Parameter::linear("raised_k_per_n", 1.0, 5.0),
     ],
     act: Act::Plate(act),
-    ..Kind::cause("resonance_detuning", Place::Plate, "the plate is driven off its resonance as it warms")
+    ..Kind::cause(Place::Plate, "the plate is driven off its resonance as it warms")
 };
 
 const QUALITY: f64 = 150.0;

@@ -2,11 +2,11 @@
 
 use super::*;
 
-pub(super) static KIND: Kind = Kind {
+pub(super) const KIND: Kind = Kind {
     parameters: &[Parameter::factor("factor", 0.02, 0.8)],
     imitated: true,
     act: Act::Contact(act),
-    ..Kind::cause("speed_error", Place::Instrument, "the true sliding speed is not the one stated")
+    ..Kind::cause(Place::Instrument, "the true sliding speed is not the one stated")
 };
 
 fn act(v: &Values, _: &Surroundings, contact: &mut Contact) {

@@ -7,16 +7,14 @@
 
 use super::*;
 
-pub(super) static KIND: Kind = Kind {
+pub(super) const KIND: Kind = Kind {
     parameters: &[
         Parameter::log("film_area_m2", 3e-8, 1.5e-5),
         Parameter::log("half_gap_m", 2e-6, 3.5e-6),
         Parameter::log("asperity_load_n", 0.5, 3.0),
     ],
     act: Act::Contact(act),
-    ..Kind::cause(
-        "squeeze_film",
-        Place::Contact,
+    ..Kind::cause(Place::Contact,
         "air trapped between ridges and plate carries part of the load",
     )
 };

@@ -3,16 +3,14 @@
 
 use super::*;
 
-pub(super) static KIND: Kind = Kind {
+pub(super) const KIND: Kind = Kind {
     parameters: &[
         Parameter::log("creep", 0.01, 1.0),
         Parameter::log("time_s", 1.0, 30.0),
         Parameter::linear("lateral_over_normal", 0.2, 1.5),
     ],
     act: Act::Contact(act),
-    ..Kind::cause(
-        "subsurface_relaxation",
-        Place::Contact,
+    ..Kind::cause(Place::Contact,
         "the tissue under the ridges creeps with the time in contact",
     )
 };

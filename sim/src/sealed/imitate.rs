@@ -31,7 +31,6 @@ const HOPELESS: f64 = 4.0;
 const WORTH: f64 = 0.15;
 /// The same for a dear cause where the truth is a cheap one.
 const WORTH_DEAR: f64 = 0.5;
-/// Steps of a search.
 const STEPS: usize = 8;
 /// Steps of a search under form uncertainty.
 const FORM_STEPS: usize = 3;

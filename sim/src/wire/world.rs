@@ -62,7 +62,6 @@ pub struct WorldPlant {
 pub const STAGE_HEARTBEAT_WITHIN: Nanos = Nanos(100_000_000);
 /// Time that the switch in the supply stays closed without a new heartbeat: what the profiles of watchdog outputs have as `timeout_ms`.
 pub const SUPPLY_HEARTBEAT_WITHIN: Nanos = Nanos(200_000_000);
-/// A stage at rest, lifted off.
 const AT_REST: StageInput = StageInput { velocity_m_s: 0.0, normal_force_n: 0.0 };
 
 /// A watchdog of the stage or of the supply's switch: where heartbeats have come and then stand still, the stage stops and lifts off,

@@ -63,7 +63,6 @@ fn entries<'a>(table: &'a DeTable<'a>) -> Vec<(String, Option<Range<usize>>, Nod
     table.iter().map(|(k, v)| (k.get_ref().to_string(), Some(k.span()), Node::Toml(v))).collect()
 }
 
-/// One thing that is wrong.
 struct Wrong {
     place: Option<Range<usize>>,
     problem: String,
@@ -248,7 +247,6 @@ fn object(
     }
 }
 
-/// Whether the schema's `type` admits a value.
 fn admits(schema: &Value, is: &Is<'_>) -> bool {
     let of = |name: &str| match is {
         Is::Table(_) => name == "object",
@@ -356,7 +354,7 @@ mod tests {
     #[test]
     fn no_bundled_file_is_misshapen() {
         for bundled in crate::schemas::bundled::all() {
-            let kind = Kind::ALL.into_iter().find(|k| k.name() == bundled.kind).unwrap();
+            let kind = Kind::all().find(|k| k.name() == bundled.kind).unwrap();
             assert_eq!(problems_of(kind, bundled.text), "", "{}", bundled.name);
         }
     }

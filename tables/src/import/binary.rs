@@ -120,18 +120,12 @@ pub fn arrow(bytes: &[u8]) -> miette::Result<Grid> {
 }
 
 /// Refuses: built without Arrow.
-///
-/// # Errors
-/// Always.
 #[cfg(not(feature = "arrow"))]
 pub fn arrow(_: &[u8]) -> miette::Result<Grid> {
     Err(crate::built_without("arrow", "take CSV"))
 }
 
 /// Refuses: built without Parquet.
-///
-/// # Errors
-/// Always.
 #[cfg(not(feature = "parquet"))]
 pub fn parquet(_: &std::path::Path) -> miette::Result<Grid> {
     Err(crate::built_without("parquet", "take CSV"))

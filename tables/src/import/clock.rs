@@ -4,7 +4,6 @@ use super::grid::{Cell, Grid};
 use super::targets::Id;
 use super::values::Values;
 
-/// A day in s.
 const DAY_S: f64 = 86_400.0;
 
 /// What a time of two fields is.

@@ -27,7 +27,6 @@ pub fn read(bytes: &[u8], sheet: Option<&str>, wanted: &[String]) -> miette::Res
     table(if matlab { "MAT 7.3" } else { "HDF5" }, found.arrays, sheet, wanted, found.beside)
 }
 
-/// What was found so far.
 struct Found {
     matlab: bool,
     /// Cells that may still be read.
@@ -36,7 +35,6 @@ struct Found {
     beside: Beside,
 }
 
-/// The texts of an attribute.
 fn texts(value: &AttrValue) -> Vec<String> {
     value
         .as_str()

@@ -3,7 +3,6 @@
 use super::grid::{Block, Grid};
 use super::targets::{Id, Kind, TARGETS, Target};
 use super::units::{Dimension, Unit};
-use models::covariate;
 
 /// A column of the source that is taken.
 #[derive(Clone, Debug)]
@@ -126,43 +125,40 @@ impl Map {
             wrong.push("time_s is mapped and set".into());
         }
         let gives = |column: &str| all.iter().any(|t| TARGETS[*t].column == column);
-        let mut missing = |column: &str, there: bool, how: &str| {
-            if !there {
+        let by_path = series && gives("position_m");
+        let needed = [
+            (
+                "time_s",
+                self.time_by_rows,
+                "HEADER=time:s, or --set time_s=rows (row after row, a second each)",
+            ),
+            (
+                "amplitude_pp_m",
+                false,
+                "HEADER=amplitude_pp:um (or amplitude_peak, amplitude_rms), or --set amplitude_pp_m=0 where nothing vibrates",
+            ),
+            (
+                "speed_m_s",
+                by_path,
+                "HEADER=speed:mm/s, HEADER=velocity:mm/s (with a sign), or --set speed_m_s=0.01",
+            ),
+            (
+                "direction",
+                by_path || self.has(Id::Velocity),
+                "HEADER=direction, a velocity with a sign, or --set direction=1",
+            ),
+            ("normal_force_n", false, "HEADER=normal_force:N, or --set normal_force_n=0.25"),
+            (
+                "lateral_force_n",
+                false,
+                "HEADER=lateral_force:N (with a sign), friction_force:N or friction_coefficient (magnitudes)",
+            ),
+        ];
+        for (column, otherwise, how) in needed {
+            if !gives(column) && !otherwise {
                 wrong.push(format!("{column} is missing: {how}"));
             }
-        };
-        let by_path = series && gives("position_m");
-        let column_of = |c: &covariate::Covariate| gives(c.name);
-        missing(
-            "time_s",
-            column_of(&covariate::TIME) || self.time_by_rows,
-            "HEADER=time:s, or --set time_s=rows (row after row, a second each)",
-        );
-        missing(
-            "amplitude_pp_m",
-            column_of(&covariate::AMPLITUDE),
-            "HEADER=amplitude_pp:um (or amplitude_peak, amplitude_rms), or --set amplitude_pp_m=0 where nothing vibrates",
-        );
-        missing(
-            "speed_m_s",
-            column_of(&covariate::SPEED) || by_path,
-            "HEADER=speed:mm/s, HEADER=velocity:mm/s (with a sign), or --set speed_m_s=0.01",
-        );
-        missing(
-            "direction",
-            column_of(&covariate::DIRECTION) || self.has(Id::Velocity) || by_path,
-            "HEADER=direction, a velocity with a sign, or --set direction=1",
-        );
-        missing(
-            "normal_force_n",
-            column_of(&covariate::NORMAL_FORCE),
-            "HEADER=normal_force:N, or --set normal_force_n=0.25",
-        );
-        missing(
-            "lateral_force_n",
-            gives("lateral_force_n"),
-            "HEADER=lateral_force:N (with a sign), friction_force:N or friction_coefficient (magnitudes)",
-        );
+        }
         wrong
     }
 }

@@ -105,7 +105,6 @@ impl<'a> Element<'a> {
         }
     }
 
-    /// Its numbers as cells.
     fn cells(&self, big: bool) -> Option<Vec<Cell>> {
         macro_rules! numbers {
             ($type:ty, $cell:expr) => {

@@ -30,22 +30,11 @@ pub enum Dimension {
 
 impl Dimension {
     /// The unit of the point table.
-    pub const fn si(self) -> &'static str {
-        match self {
-            Dimension::Length => "m",
-            Dimension::Time => "s",
-            Dimension::Frequency => "Hz",
-            Dimension::Speed => "m/s",
-            Dimension::Force => "N",
-            Dimension::Pressure => "Pa",
-            Dimension::Temperature => "degC",
-            Dimension::Percentage => "%",
-            Dimension::Angle => "deg",
-            Dimension::Ratio => "1",
-        }
+    pub fn si(self) -> &'static str {
+        self.known().split(',').next().unwrap_or_default()
     }
 
-    /// Some units that are understood, for refusals.
+    /// Some units that are understood, for refusals; first that of the point table.
     pub const fn known(self) -> &'static str {
         match self {
             Dimension::Length => "m, mm, um, nm, cm, in, rev@20mm (turns on a radius)",

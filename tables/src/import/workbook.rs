@@ -216,7 +216,6 @@ struct Repeats {
     rest: Vec<u8>,
     /// How often the row that is open is repeated, its cells up to the last that holds something, and those behind.
     row: (usize, usize, usize),
-    /// Cells so far.
     cells: usize,
 }
 

@@ -15,25 +15,14 @@ pub enum Kind {
 
 impl Kind {
     /// Its name, as it is typed.
-    pub fn name(self) -> &'static str {
-        match self {
-            Kind::Plan => "plan",
-            Kind::Setup => "setup",
-            Kind::Fingertip => "fingertip",
-            Kind::Profile => "profile",
-        }
+    pub fn name(self) -> String {
+        super::schema::typed(self)
     }
 
-    /// Its schema.
+    /// Its schema: that of the same name.
     pub fn schema(self) -> serde_json::Value {
-        use super::schema::Kind as Schema;
-        match self {
-            Kind::Plan => Schema::Plan,
-            Kind::Setup => Schema::Setup,
-            Kind::Fingertip => Schema::Fingertip,
-            Kind::Profile => Schema::Profile,
-        }
-        .for_editors()
+        let name = self.name();
+        super::schema::Kind::all().find(|kind| kind.name() == name).map(|kind| kind.for_editors()).into()
     }
 }
 

@@ -12,9 +12,9 @@ pub fn page() -> String {
          Generated from the code: `MUPRIME_UPDATE=1 cargo test --release -p muprime-tests --test words`. `muprime schema KIND` prints the \
          same as JSON Schema, for editors and programs; `muprime init KIND` prints a commented beginning, `muprime show` what is bundled.\n",
     );
-    for kind in Kind::ALL {
+    for kind in Kind::all() {
         let schema = kind.schema();
-        let _ = write!(page, "\n## {}\n\n{}\n", kind.name(), kind.words());
+        let _ = write!(page, "\n## {}\n\n{}.\n", kind.name(), kind.words());
         for (name, object) in objects(&schema) {
             if !name.is_empty() {
                 let _ = write!(page, "\n### {} `{name}`\n", kind.name());
@@ -164,7 +164,6 @@ fn named(kind: Kind, name: &str, object: &Map<String, Value>) -> String {
     }
 }
 
-/// The targets of an import.
 fn targets() -> String {
     let mut page = String::from(
         "\n## import: targets\n\nWhat a column of a foreign table can stand for in `muprime import --map HEADER=TARGET:UNIT` and `--set \

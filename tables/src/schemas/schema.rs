@@ -1,6 +1,7 @@
 //! A JSON Schema for every kind of file, from the types that read it.
 
 use crate::import::targets::{Kind as Cell, TARGETS};
+use clap::ValueEnum;
 use models::covariate;
 use schemars::generate::SchemaSettings;
 use serde_json::{Map, Value, json};
@@ -8,81 +9,43 @@ use serde_json::{Map, Value, json};
 /// A kind of file or document.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, clap::ValueEnum)]
 pub enum Kind {
-    /// A plan of passes
+    /// A plan of passes (TOML), for `muprime run PLAN`
     Plan,
-    /// A campaign: one plan with several tips, conditions and days
+    /// A campaign (TOML): one plan with several tips, conditions and days, for `muprime run CAMPAIGN`
     Campaign,
-    /// A rig: instruments, limits, fingertip
+    /// A rig (TOML), for `--setup`; the defaults and hard ranges of its limits stand in setup.md as well
     Setup,
-    /// A fingertip of the library
+    /// A fingertip (TOML), for `[finger] tip` of a setup
     Fingertip,
-    /// rig.toml: what is known of a rig beside a table
+    /// `rig.toml` beside a point table, for `muprime diagnose`
     Rig,
-    /// A row of a point table
+    /// A row of a point table (CSV or Parquet), for `muprime diagnose`
     Table,
-    /// A calibration's certificate
+    /// What `muprime calibrate` writes (TOML) and a setup names under `certificates`
     Certificate,
-    /// MODEL.toml of a diagnosis
+    /// MODEL.toml, what `muprime diagnose --save-model` writes and `muprime run --model` reads
     Model,
-    /// An instrument's description
+    /// An instrument's description (TOML), for `profile` of an instrument in a setup
     Profile,
-    /// What `muprime diagnose --json` prints
+    /// What `muprime diagnose --json` prints (JSON)
     Verdict,
 }
 
 impl Kind {
     /// Every kind.
-    pub const ALL: [Kind; 10] = [
-        Kind::Plan,
-        Kind::Campaign,
-        Kind::Setup,
-        Kind::Fingertip,
-        Kind::Rig,
-        Kind::Table,
-        Kind::Certificate,
-        Kind::Model,
-        Kind::Profile,
-        Kind::Verdict,
-    ];
+    pub fn all() -> impl Iterator<Item = Kind> {
+        Kind::value_variants().iter().copied()
+    }
 
     /// Its name on the command line.
-    pub const fn name(self) -> &'static str {
-        match self {
-            Kind::Plan => "plan",
-            Kind::Campaign => "campaign",
-            Kind::Setup => "setup",
-            Kind::Fingertip => "fingertip",
-            Kind::Rig => "rig",
-            Kind::Table => "table",
-            Kind::Certificate => "certificate",
-            Kind::Model => "model",
-            Kind::Profile => "profile",
-            Kind::Verdict => "verdict",
-        }
+    pub fn name(self) -> String {
+        typed(self)
     }
 
     /// What it is and where it is used.
-    pub const fn words(self) -> &'static str {
-        match self {
-            Kind::Plan => "A plan of passes (TOML), for `muprime run PLAN`.",
-            Kind::Campaign => {
-                "A campaign (TOML): one plan with several tips, conditions and days, for `muprime run CAMPAIGN`."
-            }
-            Kind::Setup => {
-                "A rig (TOML), for `--setup`; the defaults and hard ranges of its limits stand in setup.md as well."
-            }
-            Kind::Fingertip => "A fingertip (TOML), for `[finger] tip` of a setup.",
-            Kind::Rig => "`rig.toml` beside a point table, for `muprime diagnose`.",
-            Kind::Table => "A row of a point table (CSV or Parquet), for `muprime diagnose`.",
-            Kind::Certificate => {
-                "What `muprime calibrate` writes (TOML) and a setup names under `certificates`."
-            }
-            Kind::Model => {
-                "MODEL.toml, what `muprime diagnose --save-model` writes and `muprime run --model` reads."
-            }
-            Kind::Profile => "An instrument's description (TOML), for `profile` of an instrument in a setup.",
-            Kind::Verdict => "What `muprime diagnose --json` prints (JSON).",
-        }
+    pub fn words(self) -> String {
+        let help = self.to_possible_value().and_then(|value| value.get_help().map(ToString::to_string));
+        help.unwrap_or_default()
     }
 
     /// The schema, JSON Schema 2020-12.
@@ -115,6 +78,11 @@ impl Kind {
         }
         schema
     }
+}
+
+/// A choice of the command line, as it is typed.
+pub fn typed(choice: impl clap::ValueEnum) -> String {
+    choice.to_possible_value().map(|value| value.get_name().to_owned()).unwrap_or_default()
 }
 
 /// Lets each number below the key of a quantity (`speed_m_s`) be a text with a unit as well: `"20mm/s"`.

@@ -68,7 +68,7 @@ pub fn rough(args: &Args, kind: &str, options: &Options, json: bool) -> miette::
 
 fn tell_rough(rows: &[Answers], seed: u64, sets: usize, partial: bool, json: bool) {
     if json {
-        let report = serde_json::json!({
+        let report = json!({
             "schema": "muprime.blind.noise/1", "seed": seed, "sets": sets, "rows": rows,
         });
         return document(report, partial);
@@ -124,7 +124,7 @@ pub fn sensitivity(
 
 fn tell_sensitivity(rows: &[sensitivity::Row], seed: u64, sets: usize, partial: bool, json: bool) {
     if json {
-        let report = serde_json::json!({
+        let report = json!({
             "schema": "muprime.blind.sensitivity/1", "seed": seed, "sets": sets, "rows": rows,
         });
         return document(report, partial);
@@ -163,8 +163,7 @@ fn tell_same_form(sets: &[Covered], partial: bool, json: bool) {
     let covered = stated.iter().map(|(t, ci)| ci[0] <= *t && *t <= ci[1]).collect();
     let figure = share("size inside its 95 % interval, same form", "0.92 to 0.98", covered);
     if json {
-        let report =
-            serde_json::json!({ "schema": "muprime.blind.same_form/1", "figure": figure, "sets": sets });
+        let report = json!({ "schema": "muprime.blind.same_form/1", "figure": figure, "sets": sets });
         return document(report, partial);
     }
     let ci = figure.ci95.unwrap_or([f64::NAN; 2]);
@@ -211,7 +210,7 @@ pub fn further(args: &Args, json: bool) -> miette::Result<ExitCode> {
 fn tell_further(races: &[Race], partial: bool, json: bool) {
     let figures = further::figures(races);
     if json {
-        let report = serde_json::json!({
+        let report = json!({
             "schema": "muprime.blind.further/2", "limit": LIMIT, "figures": figures, "races": races,
         });
         return document(report, partial);

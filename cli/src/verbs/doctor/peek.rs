@@ -4,7 +4,6 @@ use super::super::prelude::*;
 use clap::ValueEnum;
 use drivers::peek::{self, Place, Speed};
 use instruments::schema::Table;
-use serde_json::json;
 use std::time::Duration;
 
 /// Arguments.
@@ -126,13 +125,10 @@ fn registers(first: u16, found: &[u16], json: bool) {
             let floats =
                 pair.map(|pair| pair.map(|bits| Some(f32::from_bits(bits)).filter(|x| x.is_finite())));
             let signed = pair.map(|pair| pair.map(u32::cast_signed));
-            out!(
-                "{}",
-                json!({
-                    "register": at, "u16": word, "i16": word.cast_signed(), "u32": pair, "i32": signed,
-                    "f32": floats,
-                })
-            );
+            answer_json(&json!({
+                "register": at, "u16": word, "i16": word.cast_signed(), "u32": pair, "i32": signed,
+                "f32": floats,
+            }));
             continue;
         }
         let wide = pair.map_or_else(String::new, |[high, low]| {
@@ -154,9 +150,8 @@ fn frames(seen: &std::collections::BTreeMap<(u32, bool), peek::Frames>, long: Du
         let rate = f64::from(of.count) / long.as_secs_f64();
         if json {
             let data = hex(&of.data);
-            out!(
-                "{}",
-                json!({ "id": id, "extended": extended, "frames": of.count, "rate_hz": rate, "data": data })
+            answer_json(
+                &json!({ "id": id, "extended": extended, "frames": of.count, "rate_hz": rate, "data": data }),
             );
         } else {
             let id = if *extended { format!("{id:#010x}") } else { format!("{id:#05x}") };
@@ -180,7 +175,7 @@ fn lines(came: &[u8], long: Duration, json: bool) {
     for line in all {
         let shown = drivers::remedy::shown(line);
         if json {
-            out!("{}", json!({ "line": shown, "hex": hex(line) }));
+            answer_json(&json!({ "line": shown, "hex": hex(line) }));
         } else {
             out!("{shown}");
         }

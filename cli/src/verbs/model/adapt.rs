@@ -3,6 +3,7 @@
 use crate::verbs::cases::{spans, values};
 use clap::Args;
 use models::ridge::Steady;
+use runs::print::answer_json;
 use runs::{out, say};
 use serde_json::{Value, json};
 use std::collections::BTreeMap;
@@ -132,9 +133,8 @@ pub fn run(args: &AdaptArgs, json: bool) -> miette::Result<ExitCode> {
     });
     runs::files::write_whole(&surrogate, document.to_string())?;
     if json {
-        out!(
-            "{}",
-            json!({ "file": surrogate, "nodes": grid.nodes.len(), "rms": rms, "wanted": args.wanted, "rounds": rounds })
+        answer_json(
+            &json!({ "file": surrogate, "nodes": grid.nodes.len(), "rms": rms, "wanted": args.wanted, "rounds": rounds }),
         );
     } else {
         out!("{}: {} nodes, rms {rms:.4} of {} wanted", surrogate.display(), grid.nodes.len(), args.wanted);

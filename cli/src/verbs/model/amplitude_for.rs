@@ -7,8 +7,10 @@ use miette::IntoDiagnostic;
 use models::inverse;
 use models::quantity::PeakToPeak;
 use models::surrogate::Surrogate;
+use runs::print::answer_json;
 use runs::report::human::{number, quantity, to_its_uncertainty};
 use runs::{out, say};
+use serde_json::json;
 use std::process::ExitCode;
 
 /// Arguments of `muprime model amplitude-for`. The amplitude flag is the largest that may be used.
@@ -32,19 +34,14 @@ pub struct AmplitudeForArgs {
 
 /// Answers; an amplitude out of reach is a failure (1), nonsense is refused (2).
 pub fn run(args: &AmplitudeForArgs, json: bool) -> miette::Result<ExitCode> {
-    if let Err(why) = args.condition.check() {
-        return refused(why);
-    }
+    args.condition.check().map_err(refused)?;
     let condition = args.condition.condition();
     let coulomb = condition.mu0 * condition.normal_force_n;
     let Some(wanted) = args.mu_relative.or(args.lateral_force_n.map(|force| force / coulomb)) else {
-        return refused("--mu-relative or --lateral-force-n is needed");
+        miette::bail!("--mu-relative or --lateral-force-n is needed");
     };
     if !(args.largest_amplitude_pp_m > 0.0 && args.largest_amplitude_pp_m <= 50e-6) {
-        return refused(format!(
-            "--largest-amplitude-pp-m {}: above 0 and at most 50e-6",
-            args.largest_amplitude_pp_m
-        ));
+        miette::bail!("--largest-amplitude-pp-m {}: above 0 and at most 50e-6", args.largest_amplitude_pp_m);
     }
     let law = Surrogate::shipped().into_diagnostic()?.with_young_modulus_pa(args.young_modulus_pa);
     let largest = PeakToPeak::from_metres(args.largest_amplitude_pp_m);
@@ -54,21 +51,18 @@ pub fn run(args: &AmplitudeForArgs, json: bool) -> miette::Result<ExitCode> {
             say!("{why}");
             return Ok(ExitCode::from(1));
         }
-        Err(why) => return refused(why),
+        Err(why) => return Err(refused(why)),
     };
     if json {
-        out!(
-            "{}",
-            serde_json::json!({
-                "amplitude_pp_m": answer.amplitude.metres(),
-                "amplitude_pp_sd_m": answer.amplitude_sd_m,
-                "mu_relative": answer.prediction.mu_relative,
-                "mu_relative_sd": answer.prediction.mu_relative_sd,
-                "lateral_force_n": answer.prediction.lateral_force_n,
-                "relative_drive_power": answer.relative_drive_power,
-                "validity": answer.prediction.validity,
-            })
-        );
+        answer_json(&json!({
+            "amplitude_pp_m": answer.amplitude.metres(),
+            "amplitude_pp_sd_m": answer.amplitude_sd_m,
+            "mu_relative": answer.prediction.mu_relative,
+            "mu_relative_sd": answer.prediction.mu_relative_sd,
+            "lateral_force_n": answer.prediction.lateral_force_n,
+            "relative_drive_power": answer.relative_drive_power,
+            "validity": answer.prediction.validity,
+        }));
     } else {
         let w = answer.amplitude.metres();
         out!(

@@ -29,6 +29,32 @@ pub struct ConditionArgs {
     pub poisson_ratio: f64,
 }
 
+/// How skin and plate meet in the ridge.
+#[derive(Args, Clone, Debug)]
+pub struct ContactArgs {
+    /// Contact penalty over the stratum corneum's modulus
+    #[arg(long, default_value_t = case::PENALTY_RATIO, allow_negative_numbers = true)]
+    penalty_ratio: f64,
+    /// Contact penalty along the plate over that across it, up to 1
+    #[arg(long, default_value_t = 1.0, allow_negative_numbers = true)]
+    tangential_penalty_ratio: f64,
+    /// A layer that yields along the plate, in series with the penalty: traction over slip in Pa/m
+    #[arg(long, allow_negative_numbers = true)]
+    tangential_stiffness_pa_m: Option<f64>,
+}
+
+impl ContactArgs {
+    /// A case with this contact.
+    pub fn of(&self, case: RidgeCase) -> RidgeCase {
+        RidgeCase {
+            penalty_ratio: self.penalty_ratio,
+            tangential_penalty_ratio: self.tangential_penalty_ratio,
+            tangential_stiffness_pa_m: self.tangential_stiffness_pa_m,
+            ..case
+        }
+    }
+}
+
 /// What a flag may be at most on any rig that vibrates a plate under a finger. The models answer for larger values too, and mean nothing.
 const LARGEST: [(&str, f64); 5] = [
     ("amplitude_pp_m", 1e-4),

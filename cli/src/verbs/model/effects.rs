@@ -4,6 +4,7 @@ use clap::Args;
 use effects::effect::Prior;
 use miette::IntoDiagnostic;
 use runs::out;
+use runs::print::answer_json;
 use runs::report::human::number;
 use std::process::ExitCode;
 
@@ -23,12 +24,12 @@ pub fn run(args: &EffectsArgs, json: bool) -> miette::Result<ExitCode> {
     if let Some(name) = &args.name {
         let known: Vec<_> = entries.iter().map(|e| e.name).collect();
         if !known.contains(&name.as_str()) {
-            return super::refused(format!("there is no effect '{name}'; known: {}", known.join(", ")));
+            miette::bail!("there is no effect '{name}'; known: {}", known.join(", "));
         }
         entries.retain(|e| e.name == name);
     }
     if json {
-        out!("{}", serde_json::to_string(&entries).into_diagnostic()?);
+        answer_json(&entries);
         return Ok(ExitCode::SUCCESS);
     }
     for entry in entries {
@@ -51,7 +52,6 @@ pub fn run(args: &EffectsArgs, json: bool) -> miette::Result<ExitCode> {
     Ok(ExitCode::SUCCESS)
 }
 
-/// A prior in words.
 fn prior(prior: Prior) -> String {
     match prior {
         Prior::Normal(sd) => format!("normal with sd {}", number(sd)),

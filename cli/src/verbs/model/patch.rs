@@ -2,12 +2,13 @@
 
 use super::refused;
 use clap::Args;
-use miette::IntoDiagnostic;
 use models::psi_fit::PsiFit;
 use models::reading::Reading;
 use models::ridge::patch::{Patch, plane_stress};
 use models::ridge::{RidgeCase, RidgeError, RunSettings, run as run_ridge, short_study};
 use runs::out;
+use runs::print::answer_json;
+use serde_json::json;
 use std::process::ExitCode;
 
 /// Arguments of `muprime model patch`.
@@ -46,21 +47,18 @@ fn rows(args: &PatchArgs) -> Result<Vec<(&'static str, Option<PsiFit>)>, RidgeEr
 /// # Errors
 /// An answer that cannot be written.
 pub fn run(args: &PatchArgs, json: bool) -> miette::Result<ExitCode> {
-    let rows = match rows(args) {
-        Ok(rows) => rows,
-        Err(why) => return refused(why),
-    };
+    let rows = rows(args).map_err(refused)?;
     if json {
         let document: Vec<serde_json::Value> = rows
             .iter()
             .map(|(what, fit)| {
-                serde_json::json!({
+                json!({
                     "what": what, "psi_star": fit.map(|f| f.psi_star), "psi_star_sd": fit.map(|f| f.psi_star_sd),
                     "rmse": fit.map(|f| f.rmse), "points": fit.map_or(0, |f| f.points),
                 })
             })
             .collect();
-        out!("{}", serde_json::to_string(&document).into_diagnostic()?);
+        answer_json(&document);
         return Ok(ExitCode::SUCCESS);
     }
     for (what, fit) in rows {

@@ -2,24 +2,26 @@
 
 use super::conditions::ConditionArgs;
 use super::refused;
-use clap::{Args, ValueEnum};
+use clap::Args;
+use clap::builder::{PossibleValuesParser, TypedValueParser};
 use miette::IntoDiagnostic;
 use models::finger::Finger;
-use models::prediction::{EmpiricalPsi, FrictionModel};
+use models::law::BuiltIn;
+use models::prediction::EmpiricalPsi;
 use models::psi::{PsiEq16, PsiEq17};
 use models::reading::Reading;
 use models::spring_slider;
 use models::surrogate::Surrogate;
 use runs::out;
+use runs::print::answer_json;
 use runs::report::human::quantity;
 use serde::Serialize;
 use std::process::ExitCode;
 
-#[derive(Clone, Copy, Debug, PartialEq, Eq, ValueEnum)]
-enum Law {
-    SpringSlider,
-    Psi,
-    Surrogate,
+/// Reads a law's name on the command line.
+fn law() -> impl TypedValueParser<Value = BuiltIn> {
+    PossibleValuesParser::new(BuiltIn::ALL.map(BuiltIn::name))
+        .try_map(|name| BuiltIn::by_name(&name).ok_or("no such law"))
 }
 
 /// Arguments of `muprime model point`.
@@ -28,8 +30,8 @@ pub struct PointArgs {
     #[command(flatten)]
     condition: ConditionArgs,
     /// Which law
-    #[arg(long, value_enum, default_value = "spring-slider")]
-    model: Law,
+    #[arg(long, value_parser = law(), default_value = "spring-slider")]
+    model: BuiltIn,
     /// Normal stiffness of the finger in N/m
     #[arg(long, default_value_t = 3.9e6, allow_negative_numbers = true)]
     normal_stiffness_n_per_m: f64,
@@ -76,9 +78,7 @@ struct Answer {
 
 /// Answers, or refuses a condition outside the law's domain.
 pub fn run(args: &PointArgs, json: bool) -> miette::Result<ExitCode> {
-    if let Err(why) = args.condition.check() {
-        return refused(why);
-    }
+    args.condition.check().map_err(refused)?;
     let condition = args.condition.condition();
     let finger = Finger {
         normal_stiffness_n_per_m: args.normal_stiffness_n_per_m,
@@ -88,43 +88,18 @@ pub fn run(args: &PointArgs, json: bool) -> miette::Result<ExitCode> {
         lateral_recovery_m_per_s: args.lateral_recovery_m_per_s.filter(|v| v.is_nan() || *v < f64::INFINITY),
         ..Finger::paper()
     };
-    let cycle = match spring_slider::solve(&condition, &finger) {
-        Ok(cycle) => cycle,
-        Err(why) => return refused(why),
-    };
-    let surrogate = Surrogate::shipped().into_diagnostic()?.for_finger(&finger);
-    let slider;
-    let empirical;
+    let cycle = spring_slider::solve(&condition, &finger).map_err(refused)?;
+    let law = args.model.law(&finger).map_err(refused)?;
     let mut readings = Vec::new();
-    let law: &dyn FrictionModel = match args.model {
-        Law::SpringSlider => {
-            slider = match models::prediction::SpringSlider::new(finger) {
-                Ok(law) => law,
-                Err(why) => return refused(why),
-            };
-            &slider
+    if args.model == BuiltIn::Psi {
+        let empirical = EmpiricalPsi::paper(finger).map_err(refused)?;
+        for reading in Reading::ALL {
+            let (mu_relative, mu_relative_sd) = empirical.under(&condition, reading).map_err(refused)?;
+            let (psi_star, psi_star_sd) = reading.psi_star();
+            readings.push(Read { reading, psi_star, psi_star_sd, mu_relative, mu_relative_sd });
         }
-        Law::Psi => {
-            empirical = match EmpiricalPsi::paper(finger) {
-                Ok(law) => law,
-                Err(why) => return refused(why),
-            };
-            for reading in Reading::ALL {
-                let (mu_relative, mu_relative_sd) = match empirical.under(&condition, reading) {
-                    Ok(under) => under,
-                    Err(why) => return refused(why),
-                };
-                let (psi_star, psi_star_sd) = reading.psi_star();
-                readings.push(Read { reading, psi_star, psi_star_sd, mu_relative, mu_relative_sd });
-            }
-            &empirical
-        }
-        Law::Surrogate => &surrogate,
-    };
-    let prediction = match law.predict(&condition) {
-        Ok(prediction) => prediction,
-        Err(why) => return refused(why),
-    };
+    }
+    let prediction = law.predict(&condition).map_err(refused)?;
     let mut answer = Answer {
         model: law.name().to_string(),
         mu_relative: prediction.mu_relative,
@@ -140,9 +115,9 @@ pub fn run(args: &PointArgs, json: bool) -> miette::Result<ExitCode> {
         psi_eq17: PsiEq17::at(&condition, finger.poisson_ratio).0,
         validity: prediction.validity,
     };
-    if args.model == Law::Surrogate {
+    if args.model == BuiltIn::Surrogate {
         let c = &condition;
-        let at = surrogate.at(
+        let at = Surrogate::shipped().into_diagnostic()?.at(
             c.amplitude,
             c.frequency_hz,
             c.speed_m_s / c.mu0,
@@ -154,7 +129,7 @@ pub fn run(args: &PointArgs, json: bool) -> miette::Result<ExitCode> {
         answer.touch_down_deg = None;
     }
     if json {
-        out!("{}", serde_json::to_string(&answer).into_diagnostic()?);
+        answer_json(&answer);
     } else {
         // A law without an error of its own says nothing of how far off it is: no uncertainty is not an uncertainty of zero.
         let sd = match answer.mu_relative_sd {

@@ -1,11 +1,13 @@
 //! `muprime model reproduce`: the paper's figures.
 
+use super::conditions::ContactArgs;
 use super::refused;
 use clap::{Args, ValueEnum};
 use miette::{IntoDiagnostic, WrapErr};
 use models::ridge::study::{FIG_9_AMPLITUDES_PP_M, FINE_AMPLITUDES_PP_M, content_key};
 use models::ridge::{RidgeCase, case};
 use runs::out;
+use serde_json::json;
 use std::path::{Path, PathBuf};
 use std::process::ExitCode;
 use studies::figures::reading::{self, Reading};
@@ -76,33 +78,25 @@ pub struct ReproduceArgs {
     /// Mass damping in 1/s, which the paper leaves open
     #[arg(long, default_value_t = case::MASS_DAMPING_PER_S)]
     mass_damping_per_s: f64,
-    /// Contact penalty along the plate over that across it, up to 1
-    #[arg(long, default_value_t = 1.0)]
-    tangential_penalty_ratio: f64,
-    /// A layer that yields along the plate, in series with the penalty: traction over slip in Pa/m
-    #[arg(long, allow_negative_numbers = true)]
-    tangential_stiffness_pa_m: Option<f64>,
+    #[command(flatten)]
+    contact: ContactArgs,
 }
 
 impl ReproduceArgs {
     /// The paper's nominal case with what is stated of the open quantities.
     fn base(&self) -> RidgeCase {
-        RidgeCase {
+        self.contact.of(RidgeCase {
             elements: self.elements,
             mean_pressure_pa: self.mean_pressure_pa,
             mass_damping_per_s: self.mass_damping_per_s,
-            tangential_penalty_ratio: self.tangential_penalty_ratio,
-            tangential_stiffness_pa_m: self.tangential_stiffness_pa_m,
             ..RidgeCase::paper()
-        }
+        })
     }
 }
 
 /// Recomputes the figure or all of them.
 pub fn run(args: &ReproduceArgs, json: bool) -> miette::Result<ExitCode> {
-    if let Err(why) = args.base().check() {
-        return refused(why);
-    }
+    args.base().check().map_err(refused)?;
     std::fs::create_dir_all(&args.out)
         .into_diagnostic()
         .wrap_err_with(|| format!("cannot make the folder {}", args.out.display()))?;
@@ -112,7 +106,7 @@ pub fn run(args: &ReproduceArgs, json: bool) -> miette::Result<ExitCode> {
     };
     let readings = args.reading.map_or(Reading::ALL.to_vec(), |one| vec![one]);
     for figure in wanted {
-        let name = figure.to_possible_value().map_or(String::new(), |v| v.get_name().to_string());
+        let name = tables::schemas::schema::typed(figure);
         for reading in &readings {
             // Fig. 6 has no amplitude to read.
             if figure == Figure::Fig6 && *reading != readings[0] {
@@ -160,7 +154,8 @@ fn one(args: &ReproduceArgs, figure: Figure, name: &str, reading: Reading, json:
     runs::files::write_whole(&args.out.join(format!("{file}.txt")), format!("{text}\n"))?;
     if json {
         let lines = &reproduced.lines;
-        let document = serde_json::json!({"figure": name, "reading": reading.name(), "files": files, "comparison": lines});
+        let document =
+            json!({"figure": name, "reading": reading.name(), "files": files, "comparison": lines});
         out!("{document}");
     } else {
         let read =
@@ -180,53 +175,36 @@ pub fn write_fig_9_table(file: &Path, study: Study, results: &store::Results) ->
     let mut csv = csv::Writer::from_path(file)
         .into_diagnostic()
         .wrap_err_with(|| format!("cannot write {}", file.display()))?;
-    csv.write_record([
-        "panel",
-        "value",
-        "amplitude_pp_m",
-        "frequency_hz",
-        "speed_m_s",
-        "normal_force_n",
-        "mu0",
-        "young_modulus_pa",
-        "psi_eq17",
-        "mu_relative",
-        "mu_relative_sd",
-        "reaction_over_load",
-        "contact_fraction",
-        "phase_shift_deg",
-        "period_doubled",
-        "steady",
-        "cycles",
-        "key",
-    ])
-    .into_diagnostic()?;
+    let mut is_first = true;
     for point in study.points() {
         let c = &point.case;
         let key = content_key(c, &figures::settings());
         let Some(run) = results.get(&key) else { continue };
         let psi = c.speed_m_s / (c.amplitude.metres() * c.frequency_hz * c.mu0 * (1.0 + c.poisson_ratio));
-        csv.write_record([
-            point.panel.variable().to_string(),
-            point.value.to_string(),
-            format!("{:e}", c.amplitude.metres()),
-            c.frequency_hz.to_string(),
-            c.speed_m_s.to_string(),
-            c.normal_force_n.to_string(),
-            c.mu0.to_string(),
-            c.young_modulus_pa.to_string(),
-            format!("{psi:.6}"),
-            format!("{:.6}", run.mu_relative),
-            format!("{:.6}", run.mu_relative_sd),
-            format!("{:.6}", run.reaction_over_load),
-            format!("{:.6}", run.contact_fraction),
-            run.phase_shift_deg.map_or(String::new(), |p| format!("{p:.2}")),
-            run.period_doubled.to_string(),
-            run.steady.to_string(),
-            run.cycles.to_string(),
-            key,
-        ])
-        .into_diagnostic()?;
+        let row = [
+            ("panel", point.panel.variable().to_string()),
+            ("value", point.value.to_string()),
+            ("amplitude_pp_m", format!("{:e}", c.amplitude.metres())),
+            ("frequency_hz", c.frequency_hz.to_string()),
+            ("speed_m_s", c.speed_m_s.to_string()),
+            ("normal_force_n", c.normal_force_n.to_string()),
+            ("mu0", c.mu0.to_string()),
+            ("young_modulus_pa", c.young_modulus_pa.to_string()),
+            ("psi_eq17", format!("{psi:.6}")),
+            ("mu_relative", format!("{:.6}", run.mu_relative)),
+            ("mu_relative_sd", format!("{:.6}", run.mu_relative_sd)),
+            ("reaction_over_load", format!("{:.6}", run.reaction_over_load)),
+            ("contact_fraction", format!("{:.6}", run.contact_fraction)),
+            ("phase_shift_deg", run.phase_shift_deg.map_or(String::new(), |p| format!("{p:.2}"))),
+            ("period_doubled", run.period_doubled.to_string()),
+            ("steady", run.steady.to_string()),
+            ("cycles", run.cycles.to_string()),
+            ("key", key),
+        ];
+        if std::mem::take(&mut is_first) {
+            csv.write_record(row.iter().map(|(name, _)| name)).into_diagnostic()?;
+        }
+        csv.write_record(row.iter().map(|(_, cell)| cell)).into_diagnostic()?;
     }
     csv.flush().into_diagnostic()
 }

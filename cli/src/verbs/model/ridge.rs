@@ -2,17 +2,18 @@
 
 mod start;
 
-use super::conditions::ConditionArgs;
+use super::conditions::{ConditionArgs, ContactArgs};
 use super::refused;
 use clap::{Args, ValueEnum};
-use miette::IntoDiagnostic;
 use models::reading::Reading;
 use models::ridge::{
     self, FrictionRule, RidgeCase, RidgeError, RidgeProfile, RidgeRun, RunSettings, Strain, case,
 };
+use runs::print::answer_json;
 use runs::report::human::{number, quantity};
 use runs::{out, say};
 use serde::Serialize;
+use serde_json::json;
 use start::OtherStart;
 use std::process::ExitCode;
 use std::time::Instant;
@@ -36,15 +37,8 @@ pub struct RidgeArgs {
     /// Retardation time of the tissue in s (0: elastic)
     #[arg(long, default_value_t = 0.0, allow_negative_numbers = true)]
     retardation_time_s: f64,
-    /// Contact penalty over the stratum corneum's modulus (3.29 if left out)
-    #[arg(long, allow_negative_numbers = true)]
-    penalty_ratio: Option<f64>,
-    /// Contact penalty along the plate over that across it, up to 1
-    #[arg(long, default_value_t = 1.0, allow_negative_numbers = true)]
-    tangential_penalty_ratio: f64,
-    /// A layer between skin and plate that yields along it, in series with the penalty: traction over slip in Pa/m
-    #[arg(long, allow_negative_numbers = true)]
-    tangential_stiffness_pa_m: Option<f64>,
+    #[command(flatten)]
+    contact: ContactArgs,
     /// Mean pressure of the gross contact in Pa (from the force, by Hertz, if left out)
     #[arg(long, allow_negative_numbers = true)]
     mean_pressure_pa: Option<f64>,
@@ -79,12 +73,9 @@ pub struct RidgeArgs {
 
 impl RidgeArgs {
     fn case(&self) -> RidgeCase {
-        let mut case = self.condition.ridge_case(self.mean_pressure_pa);
+        let mut case = self.contact.of(self.condition.ridge_case(self.mean_pressure_pa));
         case.young_modulus_pa = self.young_modulus_pa;
         case.retardation_time_s = self.retardation_time_s;
-        case.penalty_ratio = self.penalty_ratio.unwrap_or(case::PENALTY_RATIO);
-        case.tangential_penalty_ratio = self.tangential_penalty_ratio;
-        case.tangential_stiffness_pa_m = self.tangential_stiffness_pa_m;
         case.mass_damping_per_s = self.mass_damping_per_s;
         case.stiffness_damping_s = self.stiffness_damping_s;
         case.elements = self.elements;
@@ -119,10 +110,7 @@ fn partial(mu: &[f64], cycles: u64, json: bool) {
     let last = &mu[mu.len() - (mu.len() / 2).min(LAST_CYCLES)..];
     let mean = (!last.is_empty()).then(|| last.iter().sum::<f64>() / last.len() as f64);
     if json {
-        out!(
-            "{}",
-            serde_json::json!({ "partial": true, "cycles": cycles, "mu_relative": mean, "steady": false })
-        );
+        answer_json(&json!({ "partial": true, "cycles": cycles, "mu_relative": mean, "steady": false }));
         return;
     }
     match mean {
@@ -135,14 +123,12 @@ fn partial(mu: &[f64], cycles: u64, json: bool) {
 
 /// Runs the case; refuses bad input, and fails with a reason where the run diverged.
 pub fn run(args: &RidgeArgs, json: bool) -> miette::Result<ExitCode> {
-    if let Err(why) = args.condition.check() {
-        return refused(why);
-    }
+    args.condition.check().map_err(refused)?;
     let case = args.case();
     let mut settings = RunSettings { step_s: args.time_step_s, ..RunSettings::default() };
     settings.steady.tolerance = args.tolerance;
     if !(args.tolerance > 0.0 && args.tolerance < 1.0) {
-        return refused(format!("--tolerance {}: above 0 and below 1", args.tolerance));
+        miette::bail!("--tolerance {}: above 0 and below 1", args.tolerance);
     }
     let clock = Instant::now();
     // It ends where the cycles are steady: the time to go is the longest.
@@ -163,14 +149,14 @@ pub fn run(args: &RidgeArgs, json: bool) -> miette::Result<ExitCode> {
             say!("{why}");
             return Ok(ExitCode::from(1));
         }
-        Err(why) => return refused(why),
+        Err(why) => return Err(refused(why)),
     };
     let updates = run.elements as f64 * run.steps as f64;
     let element_updates_per_second = updates / wall_seconds;
     let from_above = other.as_ref();
     let answer = Answer { run: &run, wall_seconds, element_updates_per_second, case: &case, from_above };
     if json {
-        out!("{}", serde_json::to_string(&answer).into_diagnostic()?);
+        answer_json(&answer);
         return Ok(ExitCode::SUCCESS);
     }
     let law = |reading: Reading| {

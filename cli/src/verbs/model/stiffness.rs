@@ -1,13 +1,14 @@
 //! `muprime model stiffness`: static stiffnesses of the ridge across and along the plate, and what their ratio says of Psi*.
 
+use super::conditions::ContactArgs;
 use super::refused;
 use clap::Args;
-use miette::IntoDiagnostic;
 use models::reading::Reading;
 use models::ridge::short_study;
 use models::ridge::static_stiffness::{HeldAt, StaticStiffness, of_case};
-use models::ridge::{FrictionRule, RidgeCase, RidgeError, RidgeProfile, Strain, case};
+use models::ridge::{FrictionRule, RidgeCase, RidgeError, RidgeGeometry, RidgeProfile, Strain, case};
 use runs::out;
+use runs::print::answer_json;
 use serde::Serialize;
 use std::process::ExitCode;
 
@@ -26,15 +27,8 @@ pub struct StiffnessArgs {
     /// Young's modulus of the stratum corneum in Pa
     #[arg(long, default_value_t = 28.3e6, allow_negative_numbers = true)]
     young_modulus_pa: f64,
-    /// Contact penalty over the stratum corneum's modulus (3.29 if left out)
-    #[arg(long, allow_negative_numbers = true)]
-    penalty_ratio: Option<f64>,
-    /// Contact penalty along the plate over that across it, up to 1
-    #[arg(long, default_value_t = 1.0, allow_negative_numbers = true)]
-    tangential_penalty_ratio: f64,
-    /// A layer that yields along the plate, in series with the penalty: traction over slip in Pa/m
-    #[arg(long, allow_negative_numbers = true)]
-    tangential_stiffness_pa_m: Option<f64>,
+    #[command(flatten)]
+    contact: ContactArgs,
     /// The ridges of a survey instead, each with its ratio and its Psi* (a minute or two of CPU)
     #[arg(long)]
     survey: bool,
@@ -42,16 +36,13 @@ pub struct StiffnessArgs {
 
 impl StiffnessArgs {
     fn base(&self) -> RidgeCase {
-        RidgeCase {
+        self.contact.of(RidgeCase {
             elements: self.elements.unwrap_or(if self.survey { 200 } else { case::ELEMENTS }),
             mean_pressure_pa: self.mean_pressure_pa,
             poisson_ratio: self.poisson_ratio,
             young_modulus_pa: self.young_modulus_pa,
-            penalty_ratio: self.penalty_ratio.unwrap_or(case::PENALTY_RATIO),
-            tangential_penalty_ratio: self.tangential_penalty_ratio,
-            tangential_stiffness_pa_m: self.tangential_stiffness_pa_m,
             ..RidgeCase::paper()
-        }
+        })
     }
 }
 
@@ -67,25 +58,14 @@ struct Row {
 /// What is varied in the table: shape, moduli, thickness, Poisson's ratio, contact.
 fn table(base: RidgeCase) -> Vec<Row> {
     let row = |what: &str, case: RidgeCase| Row { what: what.into(), case };
-    let shaped = |profile| {
-        let mut case = base;
-        case.geometry.profile = profile;
-        case
-    };
-    let corneum = |inner_corneum_m: f64| {
-        let mut case = base;
-        case.geometry.inner_corneum_m = inner_corneum_m;
-        case
-    };
-    let ridge = |ridge_height_m: f64| {
-        let mut case = base;
-        case.geometry.ridge_height_m = ridge_height_m;
-        case
-    };
+    let shaped = |geometry| RidgeCase { geometry, ..base };
+    let profile = |profile| shaped(RidgeGeometry { profile, ..base.geometry });
+    let corneum = |inner_corneum_m| shaped(RidgeGeometry { inner_corneum_m, ..base.geometry });
+    let ridge = |ridge_height_m| shaped(RidgeGeometry { ridge_height_m, ..base.geometry });
     vec![
         row("as given", base),
-        row("ellipse", shaped(RidgeProfile::Ellipse)),
-        row("flat slab", shaped(RidgeProfile::Flat)),
+        row("ellipse", profile(RidgeProfile::Ellipse)),
+        row("flat slab", profile(RidgeProfile::Flat)),
         row("ridge 50 \u{b5}m high", ridge(50e-6)),
         row("inner corneum 30 \u{b5}m", corneum(30e-6)),
         row("inner corneum 300 \u{b5}m", corneum(300e-6)),
@@ -192,12 +172,9 @@ fn survey(args: &StiffnessArgs) -> Result<Vec<Surveyed>, RidgeError> {
 /// An answer that cannot be written.
 pub fn run(args: &StiffnessArgs, json: bool) -> miette::Result<ExitCode> {
     if args.survey {
-        let rows = match survey(args) {
-            Ok(rows) => rows,
-            Err(why) => return refused(why),
-        };
+        let rows = survey(args).map_err(refused)?;
         if json {
-            out!("{}", serde_json::to_string(&rows).into_diagnostic()?);
+            answer_json(&rows);
             return Ok(ExitCode::SUCCESS);
         }
         out!(
@@ -225,12 +202,9 @@ pub fn run(args: &StiffnessArgs, json: bool) -> miette::Result<ExitCode> {
         }
         return Ok(ExitCode::SUCCESS);
     }
-    let rows = match answers(args) {
-        Ok(rows) => rows,
-        Err(why) => return refused(why),
-    };
+    let rows = answers(args).map_err(refused)?;
     if json {
-        out!("{}", serde_json::to_string(&rows).into_diagnostic()?);
+        answer_json(&rows);
         return Ok(ExitCode::SUCCESS);
     }
     let nu = args.poisson_ratio;

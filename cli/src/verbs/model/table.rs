@@ -8,7 +8,9 @@ use miette::{IntoDiagnostic, WrapErr};
 use models::ridge::study::content_key;
 use models::ridge::{RidgeCase, case};
 use models::surrogate::{Grid, GridPoint, InterpolationError, Surrogate, TableResult};
+use runs::print::answer_json;
 use runs::{out, say};
+use serde_json::json;
 use std::collections::HashMap;
 use std::path::{Path, PathBuf};
 use std::process::ExitCode;
@@ -68,11 +70,9 @@ impl TableArgs {
 /// Runs what is missing of the study and writes its table.
 pub fn run(args: &TableArgs, json: bool) -> miette::Result<ExitCode> {
     if args.threads == Some(0) {
-        return refused("--threads 0: at least one is needed");
+        miette::bail!("--threads 0: at least one is needed");
     }
-    if let Err(why) = args.study().base.check() {
-        return refused(why);
-    }
+    args.study().base.check().map_err(refused)?;
     std::fs::create_dir_all(&args.out)
         .into_diagnostic()
         .wrap_err_with(|| format!("cannot make the folder {}", args.out.display()))?;
@@ -84,10 +84,7 @@ pub fn run(args: &TableArgs, json: bool) -> miette::Result<ExitCode> {
     })?;
     let seconds = start.elapsed().as_secs_f64();
     if json {
-        out!(
-            "{}",
-            serde_json::json!({"file": file, "cases": cases, "failed": failed, "wall_seconds": seconds})
-        );
+        answer_json(&json!({"file": file, "cases": cases, "failed": failed, "wall_seconds": seconds}));
     } else {
         out!("{}: {cases} cases, {failed} failed, {seconds:.1} s", file.display());
     }

@@ -84,7 +84,6 @@ fn conditions(grid: &Grid, checks: usize) -> String {
     text
 }
 
-/// The answers of the program.
 fn answers(command: &str, conditions: &str) -> miette::Result<Vec<[f64; 2]>> {
     let failed = || format!("the program `{command}`");
     let mut program = Command::new("sh");

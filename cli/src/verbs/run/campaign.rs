@@ -5,8 +5,9 @@ use miette::IntoDiagnostic;
 use runs::campaign::claims::Claim;
 use runs::campaign::{self, Campaign};
 use runs::catalogue::runs_folder;
+use runs::print::answer_json;
+use runs::say;
 use runs::session::Job;
-use runs::{out, say};
 use std::path::{Path, PathBuf};
 use std::process::ExitCode;
 
@@ -71,12 +72,9 @@ pub fn run(mut args: Args, text: &str, folder: &Path, json: bool) -> miette::Res
     }
     let (claims, made, _) = write(&out)?;
     if json {
-        out!(
-            "{}",
-            serde_json::json!({ "campaign": {
+        answer_json(&serde_json::json!({ "campaign": {
                 "folder": out, "sessions": made, "planned": all.len(), "claims": claims
-            } })
-        );
+            } }));
     } else {
         tell(&claims, made, all.len(), &out);
     }

@@ -23,16 +23,6 @@ pub enum Sample {
 }
 
 impl Sample {
-    /// Its name, as it is typed.
-    pub fn name(self) -> &'static str {
-        match self {
-            Sample::Dry => "dry",
-            Sample::Moist => "moist",
-            Sample::Silicone => "silicone",
-            Sample::Foreign => "foreign",
-        }
-    }
-
     fn tip(self) -> &'static str {
         match self {
             Sample::Dry => "human-index-dry",

@@ -9,46 +9,37 @@ use crate::schema::{LinkKind, Table};
 impl Compiler<'_> {
     pub(super) fn check_poll(&self, poll: &crate::schema::Poll) -> Result<(), ProfileError> {
         let name = poll.name.as_ref();
+        let wrong = |why: String| Err(self.at_name(&poll.name, format!("poll `{name}` {why}")));
         match (poll.address, poll.count) {
             (Some(_), Some(count)) if !(1..=MOST_REGISTERS).contains(&count) => {
-                let why =
-                    format!("poll `{name}` has {count} registers; one read takes 1 to {MOST_REGISTERS}");
-                return Err(self.at(poll.name.span(), why));
+                return wrong(format!("has {count} registers; one read takes 1 to {MOST_REGISTERS}"));
             }
             (Some(address), Some(count)) if u32::from(address) + u32::from(count) > 65536 => {
-                return Err(self.at(poll.name.span(), format!("poll `{name}` runs past register 65535")));
+                return wrong("runs past register 65535".into());
             }
             (Some(_), Some(_)) if poll.gap != 0 => {
-                let why = format!("poll `{name}`: `gap` is for signals with an `address` of their own");
-                return Err(self.at(poll.name.span(), why));
+                return wrong("has a `gap`, which is for signals with an `address` of their own".into());
             }
             (Some(_), None) | (None, Some(_)) => {
-                let why = format!("poll `{name}` needs both `address` and `count`, or neither");
-                return Err(self.at(poll.name.span(), why));
+                return wrong("needs both `address` and `count`, or neither".into());
             }
             _ => {}
         }
-        match (poll.once, poll.rate_hz) {
-            (true, None) => {}
-            (false, Some(rate)) if rate.is_finite() && rate > 0.0 && rate <= 20_000.0 => {}
-            _ => {
-                return Err(self.at(
-                    poll.name.span(),
-                    format!(
-                        "poll `{name}` needs either `once = true` or a `rate_hz` above 0 and at most 20000"
-                    ),
-                ));
-            }
+        let read = match (poll.once, poll.rate_hz) {
+            (true, None) => true,
+            (false, Some(rate)) => rate > 0.0 && rate <= FASTEST_HZ,
+            _ => false,
+        };
+        if !read {
+            return wrong(format!(
+                "needs either `once = true` or a `rate_hz` above 0 and at most {FASTEST_HZ}"
+            ));
         }
         for signal in poll.sequence.iter().chain(&poll.device_time) {
-            let stands = self
-                .description
-                .signal
-                .iter()
-                .any(|s| s.name.as_ref() == signal && s.frame.as_ref().is_none_or(|f| f == name));
-            if !stands {
+            let here = |frame: &Option<String>| frame.as_ref().is_none_or(|frame| frame == name);
+            if !self.description.signal.iter().any(|s| s.name.as_ref() == signal && here(&s.frame)) {
                 return Err(
-                    self.at(poll.name.span(), format!("`{signal}` of poll `{name}` is not a signal in it"))
+                    self.at_name(&poll.name, format!("`{signal}` of poll `{name}` is not a signal in it"))
                 );
             }
         }
@@ -67,7 +58,7 @@ impl Compiler<'_> {
             } else {
                 continue;
             };
-            return Err(self.at(block.name.span(), why));
+            return Err(self.at_name(&block.name, why));
         }
         Ok(())
     }
@@ -75,7 +66,7 @@ impl Compiler<'_> {
     pub(super) fn check_stream(&self) -> Result<(), ProfileError> {
         let d = self.description;
         let Some(stream) = &d.stream else { return Ok(()) };
-        let wrong = |why: &str| Err(self.at_section("[stream]", format!("[stream]: {why}")));
+        let wrong = |why: &str| Err(self.at_text("[stream]", format!("[stream]: {why}")));
         let free = matches!(d.link.kind, LinkKind::Serial | LinkKind::Tcp | LinkKind::Udp);
         let datagrams = d.link.kind == LinkKind::Udp;
         let starts = stream.start_register.is_some() || stream.start_function.is_some();
@@ -158,18 +149,16 @@ impl Compiler<'_> {
                     .any(|(signal, _)| signal.name.as_ref() == name)
             };
             if let Some(name) = named.filter(|name| !stands(name)) {
-                let place = self.text.find(&format!("\"{name}\"")).map(|at| at..at + name.len() + 2);
                 let why = format!("`sequence` of `{}`: `{name}` is not a signal in it", frame.name);
-                return Err(ProfileError::at(self.text, place, why));
+                return Err(self.at_text(&format!("\"{name}\""), why));
             }
             if let Some(crate::codec::text::Form::Pattern(pattern)) = &frame.text
                 && let Some((name, _)) = pattern.fields().find(|(name, _)| !stands(name))
             {
-                let place = self.text.find(&format!("{{{name}")).map(|at| at..at + name.len() + 1);
                 let why =
                     format!("`{{{name}}}` in the line of `{}` is not a signal of that frame", frame.name);
-                return Err(ProfileError::at(self.text, place, why)
-                    .with_help("`{*}` stands for what does not matter"));
+                let refusal = self.at_text(&format!("{{{name}"), why);
+                return Err(refusal.with_help("`{*}` stands for what does not matter"));
             }
         }
         Ok(())

@@ -1,3 +1,5 @@
+mod work;
+
 use super::*;
 use mcap::WriteOptions;
 use mcap::records::MessageHeader;

@@ -3,7 +3,7 @@
 
 use super::mechanism::drawing;
 use super::overlay::Overlay;
-use crate::report::html::{bar, escape, table};
+use crate::report::html::{bar, columns, escape, table};
 use crate::verdict::{EXPLAINED, aliases, estimate, plain};
 use diagnosis::verdict::{Diagnosis, Hypothesis, probability};
 
@@ -15,9 +15,6 @@ fn name(h: &Hypothesis) -> String {
 }
 
 /// The section.
-///
-/// # Errors
-/// Only if the drawing library fails.
 pub fn section(result: &Diagnosis, overlay: &Overlay<'_>) -> miette::Result<String> {
     let listed: Vec<&Hypothesis> =
         result.report.hypotheses.iter().filter(|h| h.probability > LISTED).take(12).collect();
@@ -35,7 +32,7 @@ pub fn section(result: &Diagnosis, overlay: &Overlay<'_>) -> miette::Result<Stri
             )
         })
         .collect();
-    let head = "<th scope=\"col\">hypothesis</th><th scope=\"col\" class=\"n\">probability</th><td></td>";
+    let head = columns("hypothesis|#probability|");
     let class: Vec<&str> = result
         .report
         .hypotheses
@@ -51,7 +48,7 @@ pub fn section(result: &Diagnosis, overlay: &Overlay<'_>) -> miette::Result<Stri
         cards += &card(h, &overlay.law(h)?);
         shown.extend(h.effects.iter().map(String::as_str));
     }
-    Ok(format!("<h2>Which cause</h2>{}{cards}", table("Hypotheses", head, &rows)))
+    Ok(format!("<h2>Which cause</h2>{}{cards}", table("Hypotheses", &head, &rows)))
 }
 
 /// What a hypothesis says, effect by effect, with its parameters and the figure of its law.
@@ -92,11 +89,7 @@ fn card(h: &Hypothesis, law: &str) -> String {
     let sizes = if rows.is_empty() {
         String::new()
     } else {
-        table(
-            &format!("Parameters of {}", name(h)),
-            "<th scope=\"col\">parameter</th><th scope=\"col\">value [95 % interval]</th>",
-            &rows,
-        )
+        table(&format!("Parameters of {}", name(h)), &columns("parameter|value [95 % interval]"), &rows)
     };
     format!(
         "<div class=\"card\"><h3>{}, probability {}</h3>{words}{laws}{law}{sizes}</div>",

@@ -1,7 +1,7 @@
 //! The gap over the operating space as tables of cells: read without colour, by a screen reader and in print.
 //! Every pass is a mark in its cell, and leads to the numbers of the pass.
 
-use crate::report::html::{escape, note, table};
+use crate::report::html::{column, escape, note, table};
 use crate::report::human::number;
 use diagnosis::data::Table;
 use models::covariate::{self, Covariate};
@@ -163,9 +163,8 @@ impl<'a> Map<'a> {
         let [rows, columns] = self.covariates;
         let which = if after { "verdict's model" } else { "recalibrated baseline" };
         let unit = |c: &Covariate| escape(&format!("{}, {}", c.words, c.shown.1));
-        let titles: String =
-            self.titles[1].iter().map(|title| format!("<th scope=\"col\">{title}</th>")).collect();
-        let head = format!("<th scope=\"col\">{} \\ {}</th>{titles}", unit(rows), unit(columns));
+        let titles: String = self.titles[1].iter().map(|title| column(title)).collect();
+        let head = column(&format!("{} \\ {}", unit(rows), unit(columns))) + &titles;
         let body: String = self
             .cells
             .iter()

@@ -12,7 +12,6 @@ use diagnosis::verdict::Hypothesis;
 use models::condition::Condition;
 use models::covariate::{self, Covariate, Scale};
 
-/// Places of a curve.
 const PLACES: u32 = 60;
 /// Share of full friction below which a law does nothing that a figure could show.
 const LEAST: f64 = 1e-4;
@@ -29,9 +28,6 @@ const ALONG: [&Covariate; 6] = [
 
 impl Overlay<'_> {
     /// The figure of a hypothesis; nothing for one without a law, or whose law the table does not move.
-    ///
-    /// # Errors
-    /// Only if the drawing library fails.
     pub fn law(&self, h: &Hypothesis) -> miette::Result<String> {
         let Some(base) = self.middle() else { return Ok(String::new()) };
         let passes = &self.table.passes;

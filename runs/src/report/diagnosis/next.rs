@@ -1,6 +1,6 @@
 //! What to measure next, in physical words, with the plan beside it.
 
-use crate::report::html::{escape, table};
+use crate::report::html::{column, escape, table};
 use crate::report::human::number;
 use crate::verdict::plain;
 use diagnosis::next::Experiment;
@@ -20,7 +20,6 @@ pub fn section(result: &Diagnosis) -> String {
     format!("<h2>What to do next</h2>{all}")
 }
 
-/// What an experiment is expected to be worth.
 fn worth(e: &Experiment) -> String {
     let [a, b] = [0, 1].map(|i| plain(&e.separates[i]));
     if e.expected_nats > BEYOND {
@@ -45,7 +44,7 @@ fn one(e: &Experiment) -> String {
         .map(|c| {
             let (_, unit) = c.shown;
             let unit = if unit.is_empty() { String::new() } else { format!(", {unit}") };
-            format!("<th scope=\"col\" class=\"n\">{}{}</th>", escape(c.words), escape(&unit))
+            column(&format!("#{}{}", escape(c.words), escape(&unit)))
         })
         .collect();
     let rows: String = e

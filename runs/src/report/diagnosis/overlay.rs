@@ -15,7 +15,6 @@ use std::collections::BTreeMap;
 const PANELS: usize = 4;
 /// Share of the passes with vibration that must lie in the panels: below it curves at one base would show too little.
 const COVERED: f64 = 0.4;
-/// Places of a curve.
 const PLACES: u32 = 60;
 
 /// The table as the figures need it: `mu'` of every pass, measured and under both models, and who is suspect.
@@ -53,9 +52,6 @@ impl<'a> Overlay<'a> {
     }
 
     /// The section: panels where enough passes share a base, else every pass against its predictions.
-    ///
-    /// # Errors
-    /// Only if the drawing library fails.
     pub fn section(&self) -> miette::Result<String> {
         let figures = match self.panels()? {
             Some(panels) => panels,
@@ -175,7 +171,6 @@ fn neighbourhood(c: &Covariate, pass: &Condition) -> Option<i64> {
     c.neighbourhood.zip(c.of(pass)).map(|(near, v)| near(v))
 }
 
-/// Rows by the level of a covariate.
 fn levels(table: &Table, rows: &[usize], c: &Covariate) -> BTreeMap<i64, Vec<usize>> {
     let mut all = BTreeMap::<i64, Vec<usize>>::new();
     for &i in rows {

@@ -1,7 +1,7 @@
 //! Every pass of a table with its numbers: where the marks of the maps lead.
 
 use super::overlay::Overlay;
-use crate::report::html::table;
+use crate::report::html::{column, columns, table};
 use diagnosis::data::Table;
 use diagnosis::predict::Forecast;
 use models::covariate::{self, Covariate};
@@ -18,13 +18,12 @@ const SETTINGS: [(&Covariate, usize); 5] = [
 
 /// The section. A link to a row opens it.
 pub fn section(points: &Table, overlay: &Overlay<'_>, forecasts: &[Forecast]) -> String {
-    let column = |name: &str| format!("<th scope=\"col\">{name}</th>");
     let settings = SETTINGS.iter().map(|(c, _)| match c.shown.1 {
         "" => column(c.words),
         unit => column(&format!("{}, {unit}", c.words)),
     });
-    let values = ["\u{3bc}' measured", "baseline", "model", "gap before", "gap after"].map(column);
-    let head = [column("pass"), settings.collect(), values.concat()].concat();
+    let values = columns("\u{3bc}' measured|baseline|model|gap before|gap after");
+    let head = [column("pass"), settings.collect(), values].concat();
     let mut rows = String::new();
     for (i, (pass, (before, after))) in points.passes.iter().zip(overlay.errors()).enumerate() {
         let point = points.points[i];

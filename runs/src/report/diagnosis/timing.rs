@@ -1,15 +1,12 @@
 //! What the edges in the run's record say of time: a sentence, the mean edge, and the numbers.
 
-use crate::report::html::{escape, note, table};
+use crate::report::html::{columns, escape, note, table};
 use crate::report::human::number;
 use crate::report::plots::verdict::edge;
 use diagnosis::timing::{Comparison, Form, title};
 use diagnosis::verdict::Diagnosis;
 
 /// The section; empty for a table without a record.
-///
-/// # Errors
-/// Only if the drawing library fails.
 pub fn section(result: &Diagnosis) -> miette::Result<String> {
     let Some(record) = &result.report.record else { return Ok(String::new()) };
     let mut text = String::from("<h2>Does the force come in time?</h2>");
@@ -39,8 +36,7 @@ pub fn section(result: &Diagnosis) -> miette::Result<String> {
         "Mean of the edges, as a share of the change of force. Points: measured. Dashes: expected of a channel in time. \
          Line: with what was found. {stated}"
     ));
-    let head = "<th scope=\"col\">form of lateness</th><th scope=\"col\" class=\"n\">probability</th>\
-                <th scope=\"col\" class=\"n\">mean delay, ms</th><th scope=\"col\" class=\"n\">sd, ms</th>";
+    let head = columns("form of lateness|#probability|#mean delay, ms|#sd, ms");
     for c in judged {
         let rows: String = c
             .forms
@@ -58,7 +54,7 @@ pub fn section(result: &Diagnosis) -> miette::Result<String> {
         text += &format!(
             "<details><summary>{}</summary>{}</details>",
             escape(&label),
-            table(&label, head, &rows)
+            table(&label, &head, &rows)
         );
     }
     Ok(text)

@@ -20,9 +20,6 @@ pub struct Series {
 const MU: [f64; 2] = [0.0, 1.15];
 
 /// Relative friction against one factor, a mark a cell.
-///
-/// # Errors
-/// Only if the drawing library fails.
 pub fn against(axis: &str, logarithmic: bool, all: &[Series]) -> miette::Result<String> {
     let places = || all.iter().flat_map(|s| s.points.iter().map(|p| p.0));
     let alt = format!("Relative friction against {axis}: {} cells, measured and predicted.", all.len());
@@ -48,9 +45,6 @@ pub fn against(axis: &str, logarithmic: bool, all: &[Series]) -> miette::Result<
 }
 
 /// Relative friction of all cells against Psi of Eq. 17, with Eq. 20.
-///
-/// # Errors
-/// Only if the drawing library fails.
 pub fn against_psi(all: &[(String, Vec<(f64, f64)>)]) -> miette::Result<String> {
     let places = || all.iter().flat_map(|(_, points)| points.iter().map(|p| p.0));
     let (low, high) = (places().fold(0.1, f64::min) * 0.8, places().fold(10.0, f64::max) * 1.2);

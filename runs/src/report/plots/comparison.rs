@@ -1,17 +1,14 @@
 //! The figures of two runs and of more.
 
 use super::{
-    COLOURS, Frame, GREY, NARROW, SERIES, Span, WIDE, band, beyond, figure, line, mark_name, measured,
-    mu_axis, series_key,
+    COLOURS, Frame, GREY, NARROW, SERIES, Span, WIDE, band, beyond, capital, figure, line, mark_name,
+    measured, mu_axis, series_key,
 };
 use crate::compare::groups::{GroupDifference, Grouped};
 use crate::compare::{Comparison, Mean, Paired};
 use crate::report::levels::{FORCE, FREQUENCY, Levels, SPEED};
 
 /// Both runs' `mu'` against amplitude, at the conditions that they have in common; a line joins the two of each condition.
-///
-/// # Errors
-/// Only if the drawing library fails.
 pub fn overlay(result: &Comparison) -> miette::Result<String> {
     let widest = widest(result);
     let means = || result.pairs.iter().flat_map(|p| [p.a, p.b]);
@@ -60,9 +57,6 @@ const FACTORS: [Factor; 3] = [
 
 /// The differences against amplitude, a mark a level of the factor that varies most, with the shift that they have in common unless they
 /// vary by more than their uncertainty.
-///
-/// # Errors
-/// Only if the drawing library fails.
 pub fn differences(result: &Comparison) -> miette::Result<String> {
     let widest = widest(result);
     let ends =
@@ -116,15 +110,7 @@ fn widest(result: &Comparison) -> f64 {
     1.05 * result.pairs.iter().map(|p| p.amplitude_pp_m * 1e6).fold(0.1, f64::max)
 }
 
-fn capital(word: &str) -> String {
-    let mut all = word.chars();
-    all.next().map_or_else(String::new, |first| first.to_uppercase().chain(all).collect())
-}
-
 /// The mean `mu'` of each group against amplitude, a mark a group, a little beside each other.
-///
-/// # Errors
-/// Only if the drawing library fails.
 pub fn group_overlay(grouped: &Grouped) -> miette::Result<String> {
     let of = |g: usize| grouped.conditions.iter().filter_map(move |c| Some((c, c.means[g]?)));
     let all = |g: usize| of(g).map(|(c, m)| (c.amplitude_pp_m * 1e6, m.mu_relative, m.sd)).collect();
@@ -132,9 +118,6 @@ pub fn group_overlay(grouped: &Grouped) -> miette::Result<String> {
 }
 
 /// The differences of each later group from the first, with intervals of 95 %.
-///
-/// # Errors
-/// Only if the drawing library fails.
 pub fn group_differences(grouped: &Grouped) -> miette::Result<String> {
     let of = |g: usize| grouped.conditions.iter().filter_map(move |c| Some((c, c.differences[g - 1]?)));
     let half = |d: &GroupDifference| 0.5 * (d.interval_95[1] - d.interval_95[0]);

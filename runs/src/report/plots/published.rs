@@ -2,8 +2,8 @@
 //! published of the same, and Eq. 20 with their `Psi*` at the conditions of the passes.
 
 use super::{
-    COLOURS, Frame, GREY, NARROW, PANEL, Span, band, beyond, figure, line, mark, mark_name, measured,
-    mu_axis, wrong,
+    COLOURS, Frame, GREY, NARROW, PANEL, Span, band, beyond, capital, figure, line, mark, mark_name,
+    measured, mu_axis, wrong,
 };
 use crate::report::RunData;
 use crate::report::html::escape;
@@ -17,7 +17,6 @@ use models::quantity::PeakToPeak;
 use plotters::prelude::*;
 use std::collections::BTreeMap;
 
-/// Places of a curve.
 const PLACES: u32 = 120;
 
 /// An axis: what it shows of a pass and of a published value, and how a condition gets such a value.
@@ -79,9 +78,6 @@ const AXES: [Axis; 4] = [
 ];
 
 /// The three panels; their captions state what is not drawn.
-///
-/// # Errors
-/// Only if the drawing library fails.
 pub fn panels(run: &RunData, all: &[Published]) -> miette::Result<String> {
     let passes: Vec<_> = run.passes.iter().map(|p| p.pass.clone()).collect();
     let mu0 = models::pass::coulomb_coefficient(&passes);
@@ -245,9 +241,4 @@ fn panel(
     }
     let cut = beyond(own.iter().map(|p| p.1).chain(values.iter().map(|v| v.2)), ys);
     Ok(format!("<figure>{svg}<figcaption>{}{cut}</figcaption></figure>", escape(&words)))
-}
-
-fn capital(word: &str) -> String {
-    let mut letters = word.chars();
-    letters.next().map_or(String::new(), |first| first.to_uppercase().collect::<String>() + letters.as_str())
 }

@@ -42,9 +42,6 @@ fn mean(passes: &[&MeasuredPass], of: fn(&MeasuredPass) -> f64) -> f64 {
 
 /// Relative friction against amplitude: a mark a speed, the spring-slider as a line with its band, and what
 /// was predicted for each pass (by a corrected model too) as a short stroke.
-///
-/// # Errors
-/// Only if the drawing library fails.
 pub fn mu_against_amplitude(run: &RunData) -> miette::Result<String> {
     let chosen = at_base(&run.passes);
     if chosen.is_empty() {
@@ -118,9 +115,6 @@ pub fn mu_against_amplitude(run: &RunData) -> miette::Result<String> {
 }
 
 /// Relative friction against Psi (Eq. 17) with Eq. 20 and the run's Psi*.
-///
-/// # Errors
-/// Only if the drawing library fails.
 pub fn mu_against_psi(run: &RunData) -> miette::Result<String> {
     let points: Vec<(f64, f64, f64)> =
         run.passes.iter().filter_map(|p| Some((p.psi_eq17?, value(p)?.1, value(p)?.2))).collect();
@@ -159,9 +153,6 @@ pub fn mu_against_psi(run: &RunData) -> miette::Result<String> {
 }
 
 /// How far each pass lies from what was expected after those before it, in the order of measurement.
-///
-/// # Errors
-/// Only if the drawing library fails.
 pub fn residuals(run: &RunData) -> miette::Result<String> {
     let points: Vec<(f64, f64, bool)> = run
         .passes
@@ -204,9 +195,6 @@ pub fn residuals(run: &RunData) -> miette::Result<String> {
 }
 
 /// Histogram of the loop's lateness.
-///
-/// # Errors
-/// Only if the drawing library fails.
 pub fn lateness(report: &LoopReport) -> miette::Result<String> {
     let bars: Vec<(f64, f64)> = report
         .histogram

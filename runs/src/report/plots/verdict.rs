@@ -22,9 +22,6 @@ pub type Curve = Vec<(f64, f64, f64)>;
 
 /// One panel of measured `mu'` under the two models: points (with the standard deviation of a pass), the recalibrated baseline in
 /// dashes, the verdict's model with its band of two standard deviations; suspects are ringed.
-///
-/// # Errors
-/// Only if the drawing library fails.
 pub fn overlay(
     title: &str,
     (x_name, span): (&str, Span),
@@ -86,9 +83,6 @@ pub struct LawPass {
 }
 
 /// A law over the passes: its curve with a band of two standard deviations.
-///
-/// # Errors
-/// Only if the drawing library fails.
 pub fn law(
     name: &str,
     (x_name, span): (&str, Span),
@@ -124,9 +118,6 @@ pub fn law(
 }
 
 /// Measured against predicted `mu'` of every pass: left the recalibrated baseline, right the verdict's model.
-///
-/// # Errors
-/// Only if the drawing library fails.
 pub fn parity(points: &[(f64, f64, f64, bool)]) -> miette::Result<String> {
     let all = || points.iter().flat_map(|(m, a, b, _)| [*m, *a, *b]);
     let [bottom, top] = mu_axis(all());
@@ -157,9 +148,6 @@ pub fn parity(points: &[(f64, f64, f64, bool)]) -> miette::Result<String> {
 }
 
 /// Errors of passes in standard deviations against one covariate: hollow before a cause was added, filled after.
-///
-/// # Errors
-/// Only if the drawing library fails.
 pub fn errors_against(c: &Covariate, limit: f64, points: &[Seen]) -> miette::Result<String> {
     let unit = c.shown.1;
     // A direction has no unit.
@@ -186,9 +174,6 @@ pub fn errors_against(c: &Covariate, limit: f64, points: &[Seen]) -> miette::Res
 
 /// The mean edge of a record: time, s, and the shares of its change that were measured, expected in time,
 /// and found.
-///
-/// # Errors
-/// Only if the drawing library fails.
 pub fn edge(title: &str, mean: &[[f64; 4]]) -> miette::Result<String> {
     let alt = format!("{title}: the mean edge as measured, as expected in time, and with what was found.");
     let shown = |from: &[f64; 4]| (-0.02..0.2).contains(&from[0]);

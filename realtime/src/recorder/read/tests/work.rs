@@ -1,6 +1,6 @@
 //! Work of a reading: linear in the file, whatever the file holds. Counted in bytes that are read, not in time.
 
-use super::*;
+use super::super::*;
 use std::io::Cursor;
 
 /// A file that counts the bytes that are read of it; every look at a place costs a buffer.
