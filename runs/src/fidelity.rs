@@ -244,12 +244,14 @@ fn group([speed, load, hz]: [f64; 3], passes: &[&Rendered], stated: &Stated, cyc
     let [forward, backward] = [ways(true), ways(false)];
     let off = [&forward, &backward].map(|w| w.iter().map(|v| (v - mean(w)).powi(2)).sum::<f64>());
     let shift_of = |w: &[f64]| (!w.is_empty()).then(|| mean(w));
+    let late =
+        (mean(&shifts.iter().map(|s| s.1).collect::<Vec<_>>()) / (speed * cycle_s)).round().max(0.0) as usize;
     let bins = |segments: usize| {
         let mut spectra = Spectra::for_passes(passes.iter().map(|p| p.samples.len()), segments, cycle_s);
         for pass in passes {
             let [wanted, measured]: [Vec<f64>; 2] = [|s: &Sample| s.wanted, |s: &Sample| s.measured]
                 .map(|of: fn(&Sample) -> f64| pass.samples.iter().map(of).collect());
-            spectra.add(&wanted, &measured);
+            spectra.add(&wanted, &measured, late);
         }
         spectra.bins(speed)
     };

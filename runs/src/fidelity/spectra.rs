@@ -41,6 +41,7 @@ pub(super) struct Spectra {
     /// Power of both, real and imaginary part of the cross spectrum, from frequency one on.
     sums: Vec<[f64; 4]>,
     segments: f64,
+    late: usize,
 }
 
 /// Segments of a pass at least: of a target of a few lines, and of a broad one, whose neighbouring lines must not
@@ -66,12 +67,17 @@ impl Spectra {
         let length = fits.clamp(LENGTHS[0], LENGTHS[1]) & !1;
         // Hann's window.
         let window = (0..length).map(|i| 0.5 - 0.5 * (TAU * i as f64 / length as f64).cos()).collect();
-        Spectra { length, cycle_s, window, sums: vec![[0.0; 4]; length / 2 - 1], segments: 0.0 }
+        Spectra { length, cycle_s, window, sums: vec![[0.0; 4]; length / 2 - 1], segments: 0.0, late: 0 }
     }
 
-    /// Takes the two series of a pass.
-    pub fn add(&mut self, wanted: &[f64], measured: &[f64]) {
+    /// Takes the two series of a pass. The measured one comes `late` samples later: they are aligned first, since a
+    /// delay within a segment pulls the gain between neighbouring lines (Bendat and Piersol, section 9.3.2); the phase
+    /// has the delay.
+    pub fn add(&mut self, wanted: &[f64], measured: &[f64], late: usize) {
         let n = self.length;
+        self.late = late;
+        let late = late.min(wanted.len());
+        let (wanted, measured) = (&wanted[..wanted.len() - late], &measured[late..]);
         let turns: Vec<(f64, f64)> = (0..n).map(|i| (TAU * i as f64 / n as f64).sin_cos()).collect();
         let ready = |series: &[f64]| -> Vec<f64> {
             let mean = series.iter().sum::<f64>() / n as f64;
@@ -105,7 +111,8 @@ impl Spectra {
             let gain = re.hypot(*im) / xx;
             let coherence = (re * re + im * im) / (xx * yy);
             let gain_sd = gain * ((1.0 - coherence).max(0.0) / (2.0 * averages * coherence)).sqrt();
-            let phase_rad = im.atan2(*re);
+            let delay = TAU * hz * self.late as f64 * self.cycle_s;
+            let phase_rad = im.atan2(*re) - delay;
             Bin { hz, per_m: hz / speed_m_s, gain, gain_sd, phase_rad, coherence }
         };
         let loud = |(_, s): &(usize, &[f64; 4])| s[0] > POWER_SHARE * most && s[1] > 0.0;
@@ -209,7 +216,7 @@ mod tests {
                     y + 0.02 * noise()
                 })
                 .collect();
-            spectra.add(&x, &series);
+            spectra.add(&x, &series, 0);
         }
         let bins = spectra.bins(0.02);
         // Of the held series: |H| = (1 - d) / |1 - d exp(-i omega T)|.
