@@ -41,7 +41,7 @@ fn every_file_is_good() {
 fn every_plan_runs_on_the_setup_of_the_examples() {
     let folder = tempfile::tempdir().unwrap();
     let setup = file("examples/setups/light-touch.toml");
-    for (i, plan) in of("plans").iter().enumerate() {
+    for (i, plan) in of("plans").iter().filter(|name| name.ends_with(".toml")).enumerate() {
         let (plan, out) = (file("examples").join(plan), folder.path().join(i.to_string()));
         let [plan, setup, out] = [&plan, &setup, &out].map(|path| path.to_str().unwrap());
         run(&["run", plan, "--setup", setup, "--fast", "--out", out]);

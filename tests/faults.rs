@@ -31,10 +31,33 @@ fn every_fault_in_every_phase_is_answered_within_its_bound_and_for_its_cause() {
     }
 }
 
+/// Every fault that may strike while the rig slides, while a grating is rendered: the amplitude never
+/// stands, and nothing is over its bound.
+#[test]
+fn every_fault_is_answered_within_its_bound_while_a_target_is_rendered() {
+    for pace in PACES {
+        let mut tally = Tally::default();
+        for (row, fault) in
+            ROWS.iter().enumerate().filter(|(_, fault)| fault.moments.contains(&Moment::Slide))
+        {
+            for seed in 0..rounds(3, 100) {
+                let strikes = vec![Strike { row, at: STEADY_AT + 37 * seed % 401 }];
+                tally.take(&Scene { moment: Moment::Render, seed, strikes, pace }, seed == 0);
+            }
+            assert!(!fault.name.is_empty());
+        }
+        println!(
+            "{pace:?}: {} faults struck while a target was rendered, {} over a bound",
+            tally.scenes, tally.failed
+        );
+        assert_clean(&tally);
+    }
+}
+
 #[test]
 fn without_a_fault_nothing_trips() {
     for pace in PACES {
-        for moment in [Moment::Idle, Moment::Ramp, Moment::Hold, Moment::Slide] {
+        for moment in [Moment::Idle, Moment::Ramp, Moment::Hold, Moment::Slide, Moment::Render] {
             for seed in 0..rounds(5, 40) {
                 let found = run(&Scene { moment, seed, strikes: Vec::new(), pace }, false);
                 assert!(found.wrong.is_empty() && found.trip.is_none(), "{moment:?} {seed}: {found:?}");

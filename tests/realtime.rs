@@ -263,3 +263,116 @@ fn a_record_takes_no_more_memory_the_longer_it_gets() {
     let rows = Reader::new(std::io::BufReader::new(std::fs::File::open(&path).unwrap()));
     assert_eq!(rows.filter(|e| matches!(e, Entry::Message { .. })).count() as u64, ROWS);
 }
+
+/// A number in [0, 1) from a counter: the fractional part of multiples of an irrational number.
+fn part(k: u64, of: f64) -> f64 {
+    (k as f64 * of).fract()
+}
+
+/// The paper's finger with a squeeze film, as a diagnosis saves it.
+fn corrected() -> effects::corrected::Corrected {
+    use effects::corrected::{Corrected, SavedEffect, SavedModel, SavedParameter};
+    use effects::operating::{Baseline, Design};
+    let law = &effects::by_name("squeeze_film").unwrap().laws[0];
+    let parameters = law.parameters.iter().map(|p| p.at_load(0.3));
+    let saved = |p: effects::Parameter| SavedParameter {
+        name: p.name.into(),
+        unit: p.unit.into(),
+        value: p.value(0.2),
+    };
+    Corrected::compile(&SavedModel {
+        schema: "muprime.model/1".into(),
+        verdict: "named".into(),
+        relative_sd: 0.01,
+        interpolation_error: 0.0,
+        baseline: Baseline { mu0: 0.5, normal_stiffness_n_per_m: 3.9e6, lateral_stiffness_n_per_m: 1.5e6 },
+        design: Design {
+            duration_s: 100.0,
+            reference_load_n: 0.3,
+            reference_speed_m_s: 0.02,
+            reference_frequency_hz: 27.5e3,
+            reference_temperature_c: 22.0,
+            stroke_m: 0.02,
+            largest_amplitude_m: 3e-6,
+        },
+        law: None,
+        effects: vec![SavedEffect {
+            name: "squeeze_film".into(),
+            law: law.name.into(),
+            acts_on: "prediction".into(),
+            parameters: parameters.map(saved).collect(),
+            covariance: Vec::new(),
+        }],
+    })
+    .unwrap()
+}
+
+/// The law turned round, at scattered conditions: what it misses by, how often it asks the law, and that it
+/// allocates nothing.
+#[test]
+fn the_inverse_meets_what_is_wanted_at_scattered_conditions_without_allocation() {
+    use models::condition::Condition;
+    use models::inverse::{MOST_EVALUATIONS, Reach, quick};
+    use models::law::BuiltIn;
+    use models::law_table::grid::Grid;
+    use models::prediction::FrictionModel;
+    use models::quantity::PeakToPeak;
+    let finger = Setup::load("virtual").unwrap().tip.finger;
+    let grid = Grid::parse(["amplitude_pp_m=0.05e-6..8e-6:33:log", "speed_m_s=0.004..0.2:9:log"]).unwrap();
+    let mu = |c: &Vec<f64>| [1.0 - (-3.5e-5 * c[1] / c[0]).exp(), 0.02];
+    let table = grid.table(0, &grid.conditions(0).iter().map(mu).collect::<Vec<_>>()).unwrap();
+    let mut laws: Vec<(String, Arc<dyn FrictionModel>)> =
+        BuiltIn::ALL.iter().map(|law| (law.name().to_string(), law.law(&finger).unwrap())).collect();
+    laws.push(("law table".into(), runs::model_file::load("own.csv", &table.csv).unwrap()));
+    laws.push(("corrected".into(), Arc::new(corrected())));
+    let count = tests::rounds(10_000, 1_000_000);
+    let largest = PeakToPeak::from_metres(8e-6);
+    for (name, law) in laws {
+        let (mut off, mut asked, mut last) = (Vec::with_capacity(count), 0u64, PeakToPeak::ZERO);
+        let mut unreached = [0u32; 3];
+        COUNT.set(0);
+        for k in 1..=count as u64 {
+            let condition = Condition {
+                frequency_hz: 20e3 + 30e3 * part(k, 0.618_034),
+                speed_m_s: 0.005 * 20f64.powf(part(k, 0.754_878)),
+                normal_force_n: 0.1 + 0.8 * part(k, 0.569_840),
+                mu0: 0.3 + 0.6 * part(k, 0.324_718),
+                ..Condition::paper()
+            };
+            let wanted = 0.1 + 0.85 * part(k, 0.819_173);
+            COUNTING.set(true);
+            let found = quick(&*law, &condition, wanted, largest, last);
+            COUNTING.set(false);
+            let found = found.expect("every law answers here");
+            asked += u64::from(found.evaluations);
+            assert!(found.evaluations <= MOST_EVALUATIONS);
+            match found.reach {
+                Reach::Within => {
+                    last = found.amplitude;
+                    let again =
+                        law.mu_relative(&Condition { amplitude: found.amplitude, ..condition }).unwrap();
+                    off.push((again - wanted).abs());
+                }
+                Reach::TooLow => unreached[0] += 1,
+                Reach::TooHigh => unreached[1] += 1,
+                Reach::BeyondLaw => unreached[2] += 1,
+            }
+        }
+        off.sort_by(f64::total_cmp);
+        let quantile = |q: f64| off[((off.len() - 1) as f64 * q) as usize];
+        println!(
+            "{name}: {count} conditions; |mu'(inverse(mu')) - mu'| 50 % {:.1e}, 99 % {:.1e}, greatest {:.1e}; too low {}, too high {}, \
+             beyond the law {}; {:.1} evaluations each, {} allocations",
+            quantile(0.5),
+            quantile(0.99),
+            quantile(1.0),
+            unreached[0],
+            unreached[1],
+            unreached[2],
+            asked as f64 / count as f64,
+            COUNT.get()
+        );
+        assert_eq!(COUNT.get(), 0, "{name}");
+        assert!(off.len() > count / 2 && quantile(0.99) < 3e-5, "{name}");
+    }
+}

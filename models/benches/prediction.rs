@@ -4,11 +4,13 @@
 
 use muprime_models::condition::Condition;
 use muprime_models::finger::Finger;
+use muprime_models::inverse::quick;
 use muprime_models::law_table::LawTable;
 use muprime_models::law_table::grid::Grid;
-use muprime_models::prediction::{FrictionModel, SpringSlider};
+use muprime_models::prediction::{EmpiricalPsi, FrictionModel, SpringSlider};
 use muprime_models::quantity::PeakToPeak;
 use muprime_models::spring_slider::{half_contact_angle_rad, solve};
+use muprime_models::surrogate::Surrogate;
 use std::f64::consts::PI;
 use std::hint::black_box;
 
@@ -68,6 +70,35 @@ fn law_table(bencher: divan::Bencher) {
         k = (k + 1) & 1023;
         law.predict(black_box(&conditions[k]))
     });
+}
+
+/// The law turned round as the loop does it: a grating of 50 cycles a period, each answer warm from the one
+/// before.
+fn inverse(bencher: divan::Bencher, law: &dyn FrictionModel) {
+    let wanted: Vec<f64> = (0..50).map(|k| 0.6 + 0.15 * (2.0 * PI * f64::from(k) / 50.0).sin()).collect();
+    let (mut k, mut last) = (0, PeakToPeak::ZERO);
+    bencher.bench_local(|| {
+        k = (k + 1) % wanted.len();
+        let found =
+            quick(law, black_box(&Condition::paper()), wanted[k], PeakToPeak::from_metres(8e-6), last);
+        last = found.map_or(last, |found| found.amplitude);
+        found
+    });
+}
+
+#[divan::bench]
+fn inverse_spring_slider(bencher: divan::Bencher) {
+    inverse(bencher, &SpringSlider::new(finger()).expect("a finger"));
+}
+
+#[divan::bench]
+fn inverse_psi(bencher: divan::Bencher) {
+    inverse(bencher, &EmpiricalPsi::paper(finger()).expect("a finger"));
+}
+
+#[divan::bench]
+fn inverse_surrogate(bencher: divan::Bencher) {
+    inverse(bencher, &Surrogate::shipped().expect("the shipped table").for_finger(&finger()));
 }
 
 #[divan::bench]

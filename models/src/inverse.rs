@@ -4,9 +4,12 @@
 //! target is the cheapest. Friction need not fall evenly with the amplitude (regimes, doubled periods): the
 //! first crossing is sought on a grid and then closed by bisection.
 
+mod quick;
+
 use crate::condition::{Condition, OutOfDomain};
 use crate::prediction::{FrictionModel, Prediction, Validity};
 use crate::quantity::PeakToPeak;
+pub use quick::{MOST_EVALUATIONS, QuickAnswer, Reach, quick};
 
 /// An amplitude for a wanted friction.
 #[derive(Clone, Copy, Debug, PartialEq)]

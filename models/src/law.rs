@@ -76,6 +76,10 @@ impl FrictionModel for Named {
         self.law.relative_friction(condition)
     }
 
+    fn mu_relative(&self, condition: &Condition) -> Result<f64, OutOfDomain> {
+        self.law.mu_relative(condition)
+    }
+
     fn parameter_relative_sd(&self) -> [f64; 2] {
         self.law.parameter_relative_sd()
     }

@@ -15,6 +15,7 @@
 //! | [`reading_evidence`] | which reading of the paper's w they support |
 //! | [`ridge`] | the finite element model of section 3 |
 //! | [`surrogate`], [`inverse`] | a table of the ridge that is quick to read; the amplitude for a wanted friction |
+//! | [`target`] | a wanted friction over position |
 //! | [`prediction`] | what every friction law answers |
 //! | [`law`], [`law_table`], [`sparse`] | laws by name; own laws as tables; the surrogate of `model adapt` |
 //! | [`pass`] | the data vocabulary: passes, the point table |
@@ -58,3 +59,4 @@ pub mod root;
 pub mod sparse;
 pub mod spring_slider;
 pub mod surrogate;
+pub mod target;

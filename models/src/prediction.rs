@@ -78,6 +78,15 @@ pub trait FrictionModel: Send + Sync {
         })
     }
 
+    /// `mu'` alone, for a loop that inverts the law in every cycle: a law that has it without its
+    /// uncertainty says it sooner.
+    ///
+    /// # Errors
+    /// As [`FrictionModel::predict`].
+    fn mu_relative(&self, condition: &Condition) -> Result<f64, OutOfDomain> {
+        self.relative_friction(condition).map(|friction| friction.mu_relative)
+    }
+
     /// Relative standard deviations of the two parameters that a calibration leaves uncertain (normal and
     /// lateral stiffness, or what takes their place). Zero: the law has none.
     fn parameter_relative_sd(&self) -> [f64; 2] {
@@ -107,6 +116,12 @@ pub trait FrictionModel: Send + Sync {
 
     /// The law that a corrected model corrects, where it is another than the spring-slider.
     fn base(&self) -> Option<&dyn FrictionModel> {
+        None
+    }
+
+    /// The wanted friction over position that a loop is to render by this law; none: the amplitude is set
+    /// as requested.
+    fn target(&self) -> Option<&crate::target::Target> {
         None
     }
 }
@@ -148,6 +163,11 @@ impl FrictionModel for SpringSlider {
             regime: cycle.regime,
             validity: Validity::Inside,
         })
+    }
+
+    fn mu_relative(&self, condition: &Condition) -> Result<f64, OutOfDomain> {
+        condition.check()?;
+        Ok(spring_slider::solve_checked(condition, &self.finger).mu_relative)
     }
 
     fn parameter_relative_sd(&self) -> [f64; 2] {
@@ -247,6 +267,13 @@ impl FrictionModel for EmpiricalPsi {
             sd: (square - mu_relative * mu_relative).max(0.0).sqrt(),
             validity: if inside { Validity::Inside } else { Validity::Extrapolated },
         })
+    }
+
+    fn mu_relative(&self, condition: &Condition) -> Result<f64, OutOfDomain> {
+        condition.check()?;
+        let group = PsiEq17::at(condition, self.finger.poisson_ratio);
+        let under = |reading: Reading| psi::relative_friction(group, reading.psi_star().0);
+        Ok(Reading::ALL.into_iter().zip(self.weights).map(|(reading, weight)| weight * under(reading)).sum())
     }
 
     fn form_sd(&self, of: &Prediction) -> f64 {

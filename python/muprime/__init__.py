@@ -11,6 +11,7 @@ says what is wrong, where, and what to do.
 
 from ._muprime import MuprimeError, __version__
 from .calibration import Certificate, CertifiedParameter, Estimate, Skin, calibrate, fit_finger, load_certificate
+from .fidelity import Fidelity, render
 from .laws import Finger, Law, models, psi, ridge, spring_slider, surrogate
 from .own_law import LawTable, tabulate
 from .plans import Plan
@@ -22,6 +23,7 @@ __all__ = [
     "Certificate",
     "CertifiedParameter",
     "Estimate",
+    "Fidelity",
     "Finger",
     "Gathered",
     "Hypothesis",
@@ -43,6 +45,7 @@ __all__ = [
     "load_certificate",
     "models",
     "psi",
+    "render",
     "ridge",
     "run",
     "spring_slider",

@@ -69,5 +69,6 @@ fn _muprime(m: &Bound<'_, PyModule>) -> PyResult<()> {
     m.add_function(wrap_pyfunction!(runs::load, m)?)?;
     m.add_function(wrap_pyfunction!(runs::cycles, m)?)?;
     m.add_function(wrap_pyfunction!(runs::run, m)?)?;
+    m.add_function(wrap_pyfunction!(runs::fidelity, m)?)?;
     Ok(())
 }

@@ -33,6 +33,17 @@ pub fn cycles(py: Python<'_>, folder: PathBuf, points: Vec<u32>) -> PyResult<Py<
     Ok(PyBytes::new(py, &bytes).unbind())
 }
 
+/// How faithfully the run of a folder rendered its target, made from its records, as JSON.
+#[pyfunction]
+pub fn fidelity(py: Python<'_>, folder: PathBuf) -> PyResult<String> {
+    let found = py.detach(|| runs::fidelity::of_run(&folder)).map_err(refused)?;
+    let nothing = || {
+        let help = "give the plan a [render] section, as the bundled 'render-grating' has";
+        refused(miette::miette!(help = help, "{} rendered nothing", folder.display()))
+    };
+    serde_json::to_string(&found.ok_or_else(nothing)?).map_err(|why| MuprimeError::new_err(why.to_string()))
+}
+
 /// A sweep of a plan (its name and its text) on the virtual rig of a setup, in virtual time, into `out`; the summary as JSON.
 #[pyfunction]
 #[pyo3(signature = (plan, text, setup, out, seed, defects, model, operator, sample, licence))]

@@ -6,6 +6,7 @@
 
 use crate::estimate::{EstimateConfig, Mu0, MuRelative, NoMu, Window};
 use crate::ports::{Nanos, SupplyCommand};
+use crate::render::{Render, Rendered};
 use crate::safety::{
     Cause, Controls, Decision, DriveCommand, Exposed, Limits, Observation, Remark, Request, Safety,
     StageCommand, State, Trip,
@@ -49,6 +50,9 @@ pub struct Marker {
 pub enum Command {
     /// New set-points, and what they are for.
     Set(Request, Marker),
+    /// The same, with the amplitude that the model's target wants at each position; that of the request is
+    /// the largest.
+    Render(Request, Marker),
     /// A reset edge.
     Reset,
     /// Stop and latch.
@@ -94,6 +98,7 @@ pub struct CycleState {
     key_held_at: Option<Nanos>,
     mu0: Option<Mu0>,
     ambient: Ambient,
+    render: Option<Render>,
 }
 
 impl CycleState {
@@ -165,6 +170,8 @@ pub struct Outputs {
     pub usable: bool,
     /// Something is not as it should be, short of a trip.
     pub remark: Option<Remark>,
+    /// What the target wants here, and the amplitude that the next cycle requests for it.
+    pub rendered: Option<Rendered>,
 }
 
 const fn assert_copy<T: Copy>() {}
@@ -226,6 +233,7 @@ pub fn judge(
         state.window.mu_relative(&config.estimate, direction, state.mu0, age)
     };
     let online = mu_relative.ok().and_then(|mu| compare(config, model, state, seen, &mu, now));
+    let rendered = render(config, model, state, seen, now);
 
     let Decision { drive, stage, supply, tripped, blocking, waits_for, remark, .. } = *decision;
     Outputs {
@@ -242,7 +250,31 @@ pub fn judge(
         online,
         usable,
         remark,
+        rendered,
     }
+}
+
+/// What the next cycle requests, where a target is rendered: decided behind this cycle's command, so that
+/// no law delays an 'off'.
+fn render(
+    config: &Config,
+    model: &dyn FrictionModel,
+    state: &mut CycleState,
+    seen: &Observation,
+    now: Nanos,
+) -> Option<Rendered> {
+    let mut render = state.render?;
+    let found = model.target().and_then(|target| {
+        let normal_force_n = state.window.means()?.1;
+        let condition = condition_now(config, state, seen, normal_force_n, now)?;
+        let frequency_hz = state.request.frequency_hz;
+        let lateral = seen.forces.lateral.ok().map(|r| r.value);
+        render.next(model, target, &Condition { frequency_hz, ..condition }, lateral, &config.limits)
+    });
+    // Without a target here, a position, a load or a mu_0 nothing is driven.
+    state.request.amplitude = found.map_or(PeakToPeak::ZERO, |found| found.amplitude);
+    state.render = Some(render);
+    found
 }
 
 fn take_commands(state: &mut CycleState, inputs: &Inputs, now: Nanos) -> Controls {
@@ -253,7 +285,19 @@ fn take_commands(state: &mut CycleState, inputs: &Inputs, now: Nanos) -> Control
                 if *marker != state.marker || *request != state.request {
                     state.window.clear();
                 }
-                (state.request, state.marker) = (*request, *marker);
+                (state.request, state.marker, state.render) = (*request, *marker, None);
+                controls.new_request = true;
+            }
+            Command::Render(request, marker) => {
+                // What is driven already goes on until the target's amplitude is known: a new phase changes
+                // nothing.
+                let held = state.request.amplitude.metres().min(request.amplitude.metres());
+                let amplitude = PeakToPeak::from_metres(held.max(0.0));
+                if *marker != state.marker {
+                    state.window.clear();
+                }
+                state.render = Some(Render::up_to(request.amplitude, state.render));
+                (state.request, state.marker) = (Request { amplitude, ..*request }, *marker);
                 controls.new_request = true;
             }
             Command::Reset => controls.reset = true,
@@ -264,12 +308,47 @@ fn take_commands(state: &mut CycleState, inputs: &Inputs, now: Nanos) -> Control
             Command::Ambient(ambient) => state.ambient = *ambient,
         }
     }
+    controls.modulated = state.render.is_some();
     controls.dead_man = state.key_held_at.is_some_and(|at| now.since(at) <= KEY_AGE);
     controls
 }
 
 fn direction_of(velocity_m_s: f64) -> Direction {
     if velocity_m_s < 0.0 { Direction::Backward } else { Direction::Forward }
+}
+
+/// The condition that is measured now; none without amplifier, stage or `mu_0`.
+fn condition_now(
+    config: &Config,
+    state: &CycleState,
+    seen: &Observation,
+    normal_force_n: f64,
+    now: Nanos,
+) -> Option<Condition> {
+    let amplifier = seen.amplifier.ok()?;
+    let stage = seen.stage.ok()?;
+    let mu0 = state.mu0?;
+    let amplitude = if amplifier.output_on { amplifier.amplitude.ok()?.value } else { 0.0 };
+    Some(
+        Condition {
+            amplitude: PeakToPeak::from_metres(amplitude.max(0.0)),
+            frequency_hz: if amplitude > 0.0 {
+                amplifier.echoed_frequency_hz
+            } else {
+                config.limits.frequency_hz.0
+            },
+            speed_m_s: stage.velocity_m_s.abs(),
+            direction: direction_of(stage.velocity_m_s),
+            normal_force_n,
+            mu0: mu0.value,
+            position_m: stage.position_m,
+            time_s: now.seconds(),
+            // The table of a run holds this channel's temperature: what a model was diagnosed on.
+            temperature_c: amplifier.temperature_c.ok().map(|r| r.value).filter(|t| t.is_finite()),
+            ..Condition::paper()
+        }
+        .within(&state.ambient),
+    )
 }
 
 /// The prediction at what is measured now: amplitude and speed as read back, normal force as sensed.
@@ -281,29 +360,8 @@ fn compare(
     mu: &MuRelative,
     now: Nanos,
 ) -> Option<Online> {
-    let amplifier = seen.amplifier.ok()?;
-    let stage = seen.stage.ok()?;
-    let mu0 = state.mu0?;
     let (_, normal_force_n, _) = state.window.means()?;
-    let amplitude = if amplifier.output_on { amplifier.amplitude.ok()?.value } else { 0.0 };
-    let condition = Condition {
-        amplitude: PeakToPeak::from_metres(amplitude.max(0.0)),
-        frequency_hz: if amplitude > 0.0 {
-            amplifier.echoed_frequency_hz
-        } else {
-            config.limits.frequency_hz.0
-        },
-        speed_m_s: stage.velocity_m_s.abs(),
-        direction: direction_of(stage.velocity_m_s),
-        normal_force_n,
-        mu0: mu0.value,
-        position_m: stage.position_m,
-        time_s: now.seconds(),
-        // The table of a run holds this channel's temperature: what a model was diagnosed on.
-        temperature_c: amplifier.temperature_c.ok().map(|r| r.value).filter(|t| t.is_finite()),
-        ..Condition::paper()
-    }
-    .within(&state.ambient);
+    let condition = condition_now(config, state, seen, normal_force_n, now)?;
     let prediction = model.predict(&condition).ok()?;
     let sd = mu.sd.hypot(prediction.mu_relative_sd);
     // A model that has diverged has no opinion; nothing that is commanded depends on it.

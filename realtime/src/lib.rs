@@ -7,6 +7,7 @@
 //! | [`safety`] | limits, the state machine, the only maker of a [`safety::DriveCommand`] |
 //! | [`estimate`] | `mu`, `mu'` with uncertainty and age; means over a pass |
 //! | [`compare`] | residuals against the model; the test that says when they disagree |
+//! | [`render`] | the amplitude of the next cycle for a wanted friction |
 //! | [`turn`] | one turn of the loop over real ports; the row that it leaves behind |
 //! | [`pacing`] | the thread: absolute deadlines, lateness histogram; in `pacing/machine.rs` what it asks of the machine |
 //! | [`clock`] | time of drivers, loop and virtual world; a virtual rig's can be held |
@@ -39,6 +40,7 @@ pub mod pacing;
 pub mod ports;
 pub mod queue;
 pub mod recorder;
+pub mod render;
 pub mod replay;
 pub mod safety;
 pub mod stall_monitor;

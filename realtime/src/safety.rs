@@ -18,6 +18,7 @@
 
 mod arming;
 mod cause;
+mod envelope;
 mod exposure;
 mod limits;
 mod rules;
@@ -188,6 +189,9 @@ pub struct Controls {
     /// The second channel opens, where it is fitted, until it is proved again: somebody is about to reach into the rig.
     #[serde(default)]
     pub open_supply: bool,
+    /// The amplitude changes from cycle to cycle: what it should be is judged over a stretch of time.
+    #[serde(default)]
+    pub modulated: bool,
 }
 
 /// Everything that safety looks at in a cycle.

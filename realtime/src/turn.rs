@@ -4,6 +4,7 @@
 use crate::cycle::{self, COMMANDS_PER_CYCLE, Config, CycleState, Inputs, Marker, Online, Outputs};
 use crate::estimate::{MuRelative, NoMu};
 use crate::ports::{Absent, Amplifier, ForceSensor, Nanos, SafetyInputs, Stage, SupplyCommand, SupplySwitch};
+use crate::render::Rendered;
 use crate::safety::{Cause, Observation, Remark, Trip};
 use models::prediction::FrictionModel;
 use serde::{Deserialize, Serialize};
@@ -83,6 +84,9 @@ pub struct Row {
     pub usable: bool,
     /// Something is not as it should be, short of a trip.
     pub remark: Option<Remark>,
+    /// What a target wants here, and the amplitude that the next cycle requests for it.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub rendered: Option<Rendered>,
 }
 
 impl Row {
@@ -107,6 +111,7 @@ impl Row {
             online: out.online,
             usable: out.usable,
             remark: out.remark,
+            rendered: out.rendered,
         }
     }
 }

@@ -40,6 +40,7 @@ pub mod catalogue;
 pub mod certificates;
 pub mod compare;
 pub mod exposure_left;
+pub mod fidelity;
 pub mod files;
 pub mod fingertip;
 pub mod input;

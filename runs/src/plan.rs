@@ -1,8 +1,10 @@
 //! A plan: which passes to make, in which order, and how each is made.
 
 mod bundled;
+mod follow;
 mod points;
 mod reach;
+mod render;
 mod steps;
 mod visible;
 
@@ -18,6 +20,7 @@ pub use bundled::{BUNDLED, text as bundled_text};
 pub(crate) use points::series_place;
 pub use points::{PlanProblem, Point, Resolution};
 pub use reach::{Reach, times};
+pub use render::{Control, Kind, RenderPlan};
 pub use steps::{Action, Step, When};
 pub use visible::{COUNTS_MIN, LateralChannel};
 
@@ -56,6 +59,9 @@ pub struct PlanFile {
     /// How close the air must be to the levels of the series, and how long a run waits for them.
     #[serde(default)]
     pub tolerances: crate::ambient::Tolerances,
+    /// What the passes render, where they do not hold an amplitude.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub render: Option<RenderPlan>,
     /// What a person does before the passes, between groups of them and after; the rig is disarmed meanwhile.
     #[serde(default, skip_serializing_if = "Vec::is_empty")]
     pub step: Vec<Step>,
@@ -103,6 +109,9 @@ pub struct PassTimes {
     pub settle_s: f64,
     /// s that are averaged.
     pub measure_s: f64,
+    /// m that are measured in place of `measure_s`: the same way at every speed.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub measure_m: Option<f64>,
     /// m/s of the lifted travel to the start of a pass. Left out: 0.15, or what the stage takes where that is less.
     pub approach_speed_m_s: f64,
     /// s from one edge to the next, in series with `edges`; at least 0.2.
@@ -110,10 +119,15 @@ pub struct PassTimes {
 }
 
 impl PassTimes {
+    /// s that are measured at a speed in m/s.
+    pub fn measured_s(&self, speed_m_s: f64) -> f64 {
+        self.measure_m.map_or(self.measure_s, |way| way / speed_m_s)
+    }
+
     /// s for which a pass slides forward, and s that follow back: with `edges` the drive goes off and on so
     /// many times after the average, off once more, and the stage turns round.
-    pub fn sliding_s(&self, edges: u32) -> [f64; 2] {
-        let average = self.settle_s + self.measure_s;
+    pub fn sliding_s(&self, edges: u32, speed_m_s: f64) -> [f64; 2] {
+        let average = self.settle_s + self.measured_s(speed_m_s);
         if edges == 0 {
             [average, 0.0]
         } else {
@@ -124,7 +138,7 @@ impl PassTimes {
 
 impl Default for PassTimes {
     fn default() -> Self {
-        PassTimes { settle_s: 0.15, measure_s: 0.25, approach_speed_m_s: 0.15, edge_s: 0.3 }
+        PassTimes { settle_s: 0.15, measure_s: 0.25, measure_m: None, approach_speed_m_s: 0.15, edge_s: 0.3 }
     }
 }
 
@@ -310,6 +324,17 @@ impl Plan {
         }
         if file.pass.edge_s < 0.2 {
             wrong.add(&["pass", "edge_s"], "edge_s is at least 0.2: an edge needs its levels", None);
+        }
+        if let Some(way) = file.pass.measure_m
+            && !(way.is_finite() && (1e-3..=1.0).contains(&way))
+        {
+            wrong.add(&["pass", "measure_m"], format!("measure_m = {way}: 1 mm to 1 m is needed"), None);
+        }
+        if let Some(render) = &file.render {
+            render.check(&mut wrong);
+            if file.series.iter().any(|series| series.edges > 0) {
+                wrong.add(&["series"], "a plan that renders has no edges", None);
+            }
         }
         file.tolerances.check(&mut wrong);
         file.step.iter().for_each(|step| step.check(&mut wrong));

@@ -6,6 +6,7 @@ pub mod comparison;
 pub mod diagnosis;
 pub mod events;
 mod explore;
+pub mod fidelity;
 pub mod groups;
 pub mod html;
 pub mod human;
@@ -45,6 +46,8 @@ pub struct RunData {
     pub summary: Option<Summary>,
     /// The finger of rig.toml.
     pub finger: Finger,
+    /// How faithfully it rendered its target; none of a run that rendered nothing.
+    pub fidelity: Option<crate::fidelity::Fidelity>,
     /// What is damaged or missing in the run's folder.
     pub damage: Vec<String>,
 }
@@ -93,7 +96,8 @@ pub fn read(folder: &Path) -> miette::Result<RunData> {
         std::fs::read(folder.join("summary.json")).ok().and_then(|b| serde_json::from_slice(&b).ok());
     let rig = crate::input::rig_file(&folder.join("rig.toml"))?;
     let about = about::of_run(folder, &facts, Some(&rig));
-    Ok(RunData { about, facts, files, passes, events, summary, finger: rig.finger, damage })
+    let fidelity = crate::fidelity::read(folder);
+    Ok(RunData { about, facts, files, passes, events, summary, finger: rig.finger, fidelity, damage })
 }
 
 /// The report of a run as HTML.

@@ -271,7 +271,8 @@ impl Sequence {
 
     /// Time that the rest should take in s, by the plan.
     pub fn remaining_s(&self) -> f64 {
-        let each = |p: &Point| self.times.sliding_s(p.edges).iter().sum::<f64>() + 0.15;
+        let each =
+            |p: &Point| self.times.sliding_s(p.edges, p.condition.speed_m_s).iter().sum::<f64>() + 0.15;
         self.points[self.next..].iter().map(each).sum()
     }
 
@@ -414,9 +415,22 @@ impl Sequence {
         Marker { point: self.points.get(self.next).map_or(u32::MAX, |p| p.number), phase }
     }
 
+    /// The command of a pass while it slides: a target is rendered up to the amplitude of the pass.
+    fn slide(&self, c: &Condition, phase: Phase) -> Command {
+        let command = if self.renders(c) { Command::Render } else { Command::Set };
+        command(sliding(c), self.marker(phase))
+    }
+
+    /// Whether a pass at this condition renders a target.
+    fn renders(&self, c: &Condition) -> bool {
+        c.amplitude > PeakToPeak::ZERO && self.model.target().is_some()
+    }
+
     /// Length of the stroke of a pass in m, half of it either side of its position.
     fn half_stroke_m(&self, point: &Point) -> f64 {
-        0.5 * (point.condition.speed_m_s * self.times.sliding_s(point.edges)[0] * 1.05)
+        0.5 * (point.condition.speed_m_s
+            * self.times.sliding_s(point.edges, point.condition.speed_m_s)[0]
+            * 1.05)
     }
 
     fn begin_next(&mut self, row: &Row, out: &mut Reaction) {
@@ -482,7 +496,7 @@ impl Sequence {
         let away = start - stage.position_m;
         // Close enough, or already past the start in the sense of the pass but not by more than a millimetre.
         if away.abs() < 2e-4 {
-            out.commands.push(Command::Set(sliding(c), self.marker(Phase::Settle)));
+            out.commands.push(self.slide(c, Phase::Settle));
             self.stage = Stage::Settle { since: row.now };
             return;
         }
@@ -514,7 +528,7 @@ impl Sequence {
             return;
         }
         let c = self.points[self.next].condition;
-        out.commands.push(Command::Set(sliding(&c), self.marker(Phase::Measure)));
+        out.commands.push(self.slide(&c, Phase::Measure));
         self.sums = Sums::default();
         self.at_rig.begin_pass();
         self.check_temperature(row, out);

@@ -8,10 +8,12 @@ pub mod keeper;
 mod telemetry;
 
 pub use fast::{Rehearsal, rehearse, rehearse_watched, words};
-pub use keeper::{Keeper, REPLAYABLE, Replayable, is_model, model_name, unix_ns};
+pub use keeper::{Keeper, REPLAYABLE, Replayable, TARGET, is_model, model_name, unix_ns};
 pub use telemetry::{Deadlines, Extremes, LATENESS_BOUNDS_S, Snapshot, Snapshots};
 
 use crate::ambient::{Answers, LevelsFound};
+use crate::fidelity::Stated;
+use crate::fidelity::dynamics::Dynamics;
 use crate::plan::{Plan, Point, Resolution};
 use crate::run_dir::{Identity, RunDir};
 use crate::sequence::{Event, MeasuredPass, Outcome, PAUSE_MAX_S, Sequence};
@@ -20,6 +22,7 @@ use crate::supervisor::OffReport;
 use calibration::certificate::sha256_hex;
 use models::prediction::FrictionModel;
 use models::psi_star::PsiStar;
+use models::target::{Rendering, Target};
 use realtime::clock::HeldBack;
 use realtime::compare::Agreement;
 use realtime::pacing::LoopReport;
@@ -260,7 +263,32 @@ impl Job {
             let mu0 = self.setup.tip.mu0;
             self.plan.check_visible(&points, &resolution, &*self.model, mu0, &channel)?;
         }
+        self.followed(&points)?;
         Ok(points)
+    }
+
+    /// The target of a plan that renders one, and what the rig will not show of it, in sentences.
+    ///
+    /// # Errors
+    /// A target that cannot be had, or that the rig cannot follow.
+    pub fn followed(&self, points: &[Point]) -> miette::Result<Option<(Target, Vec<String>)>> {
+        let (limits, mu0) = (&self.setup.config.limits, self.setup.tip.mu0);
+        let known = |frequency_hz| Dynamics::of(&self.setup, frequency_hz);
+        let feedback = self.plan.feedback(&known(self.plan.file.base.frequency_hz))?;
+        let Some(target) = self.plan.target(mu0, feedback)? else { return Ok(None) };
+        let remarks = self.plan.check_followed(&target, points, &*self.model, mu0, limits, &known)?;
+        Ok(Some((target, remarks)))
+    }
+
+    /// What the plan states of its rendering, and what is known of the rig.
+    ///
+    /// # Errors
+    /// As [`Job::points`].
+    pub fn stated(&self) -> miette::Result<Stated> {
+        let points = self.plan.points(self.seed, &self.setup.config.limits, &self.resolution()?)?;
+        let remarks = self.followed(&points)?.map(|(_, remarks)| remarks).unwrap_or_default();
+        let tolerance = self.plan.file.render.as_ref().map_or(0.0, |render| render.tolerance);
+        Ok(Stated::of(tolerance, &points, |hz| Dynamics::of(&self.setup, hz), remarks))
     }
 
     /// What the setup's amplifier can set, by its profile.
@@ -283,6 +311,9 @@ impl Job {
     /// A refusal: passes that the rig cannot do, a folder of another run or of a living one.
     pub fn begin(&mut self) -> miette::Result<Begun> {
         let points = self.points()?;
+        if let Some((target, _)) = self.followed(&points)? {
+            self.model = Arc::new(Rendering { law: Arc::clone(&self.model), target });
+        }
         let planned = points.len();
         let answers = self.setup.answers(self.answers.as_deref(), self.asks_a_person())?;
         let mut dir = RunDir::open(&self.out, &Identity { planned, ..self.identity() })?;

@@ -62,6 +62,7 @@ CURVES = {
     "/force/lateral_force_n": lambda r: ok(r["inputs"]["seen"]["forces"]["lateral"], "value"),
     "/force/normal_force_n": lambda r: ok(r["inputs"]["seen"]["forces"]["normal"], "value"),
     "/friction/mu_relative": lambda r: ok(r["mu_relative"], "value"),
+    "/friction/mu_relative_wanted": lambda r: r.get("rendered") and r["rendered"]["wanted"],
     "/friction/residual_z": lambda r: r["online"] and r["online"]["z"],
     "/drive/amplitude_pp_m": lambda r: ok(ok(r["inputs"]["seen"]["amplifier"], "amplitude"), "value"),
     "/drive/commanded_amplitude_pp_m": lambda r: r["drive_pp_m"],

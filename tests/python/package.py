@@ -77,6 +77,15 @@ with h5py.File(FOLDER / "run.nc") as held_in:
     assert held_in["passes/speed_m_s"].attrs["units"] == "m/s"
 print(f"cycles: {len(forces)} of {len(cycles)} curves; NetCDF {(FOLDER / 'run.nc').stat().st_size / 1e6:.1f} MB")
 
+# A grating, rendered: wanted, commanded, predicted and measured over position as arrays; a plan without a target is refused.
+rendered = muprime.render(out=FOLDER / "grating")
+assert [round(group.speed_m_s * 1e3) for group in rendered.groups] == [10, 20, 40]
+for group in rendered.groups:
+    forward = group.forward
+    assert len(forward["x_m"]) > 100 and np.corrcoef(forward["wanted"], forward["predicted"])[0, 1] > 0.9
+    assert group.rms_shifted < 0.06 and len(group.transfer["hz"]) > 0, group
+refusal(lambda: muprime.render("first-sweep", out=FOLDER / "flat"), "rendered nothing")
+
 # The verdict is the command's, byte for byte: of a run, of a path, and of frames whose text is the table's.
 began = time.perf_counter()
 verdict = muprime.diagnose(run)

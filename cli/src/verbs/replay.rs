@@ -3,10 +3,11 @@
 use super::prelude::*;
 use models::law::BuiltIn;
 use models::prediction::FrictionModel;
+use models::target::Rendering;
 use realtime::recorder::{CYCLES, Entry, Integrity, Reader, inspect};
 use realtime::replay::{Replay, replay};
 use runs::run_dir::{missing_records, records_in};
-use runs::session::{REPLAYABLE, Replayable};
+use runs::session::{REPLAYABLE, Replayable, TARGET};
 use std::fs::File;
 use std::io::BufReader;
 use std::sync::Arc;
@@ -117,8 +118,13 @@ fn again(path: PathBuf) -> miette::Result<Found> {
 
 fn model_of(files: &[(String, Vec<u8>)], built: &Replayable) -> miette::Result<Arc<dyn FrictionModel>> {
     let file = files.iter().find(|(name, _)| runs::session::is_model(name));
-    match (file, built.law) {
-        (Some((name, text)), _) => runs::model_file::law(&built.finger, name, &String::from_utf8_lossy(text)),
-        (None, law) => law.unwrap_or(BuiltIn::SpringSlider).law(&built.finger).into_diagnostic(),
-    }
+    let law = match (file, built.law) {
+        (Some((name, text)), _) => {
+            runs::model_file::law(&built.finger, name, &String::from_utf8_lossy(text))?
+        }
+        (None, law) => law.unwrap_or(BuiltIn::SpringSlider).law(&built.finger).into_diagnostic()?,
+    };
+    let Some((_, target)) = files.iter().find(|(name, _)| name == TARGET) else { return Ok(law) };
+    let target = serde_json::from_slice(target).into_diagnostic().wrap_err(TARGET)?;
+    Ok(Arc::new(Rendering { law, target }))
 }

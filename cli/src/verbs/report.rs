@@ -45,12 +45,18 @@ pub fn run(args: Args, json: bool) -> miette::Result<ExitCode> {
         return super::exit(super::DONE);
     }
     let overlay: miette::Result<Vec<_>> = args.overlay.iter().map(|name| published::of(name)).collect();
+    // Made again from the record, so that the page and the file agree with this version.
+    let fidelity = match args.run.join(runs::fidelity::FILE).is_file() {
+        true => runs::fidelity::write(&args.run)?,
+        false => None,
+    };
     let (html, damage) = runs::report::html_and_damage(&args.run, &overlay?.concat())?;
     let out = args.out.unwrap_or_else(|| args.run.join("report.html"));
     runs::files::write_output(&out, html)?;
     if json {
         answer_json(&json!({ "report": out, "damage": damage }));
     } else {
+        fidelity.iter().flat_map(runs::report::fidelity::lines).for_each(|line| say!("{line}"));
         say!("report: {}", out.display());
         damage.iter().for_each(|d| say!("{d}"));
     }

@@ -117,6 +117,9 @@ pub fn run(mut args: Args, json: bool) -> miette::Result<ExitCode> {
     // An address that is taken is a refusal: nothing was touched yet.
     let points = job.points()?;
     let mu0 = job.setup.tip.mu0;
+    if let Some((_, remarks)) = job.followed(&points)? {
+        remarks.iter().for_each(|remark| report!("{remark}"));
+    }
     let untold = |c: &Condition| job.model.predict(&Condition { mu0, ..*c }).is_err();
     match points.iter().filter(|p| untold(&p.condition)).count() {
         0 => {}
@@ -378,6 +381,8 @@ fn tell(summary: &Summary, json: bool) {
         report!("this run is already complete; nothing was measured");
     }
     report!("{} of {} passes", summary.passes, summary.planned);
+    let rendered = runs::fidelity::read(&summary.folder);
+    rendered.iter().flat_map(runs::report::fidelity::lines).for_each(|line| report!("{line}"));
     if let Some(report) = &summary.loop_report {
         let [p50, _, p99, _, max] = report.lateness_ns.map(|ns| ns as f64 / 1e3);
         report!(

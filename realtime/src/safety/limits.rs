@@ -389,6 +389,12 @@ impl Limits {
 }
 
 impl Timing {
+    /// Time from a new set-point until a fresh state must show it: five ring times, twice the state's age,
+    /// two cycles.
+    pub const fn response(&self) -> Nanos {
+        Nanos(5 * self.ring_time.0 + 2 * self.amplifier.age_limit().0 + 2 * self.cycle.0)
+    }
+
     /// The longest that a command may wait: two cycles, and 20 ms where a cycle is short. A link's thread on a general-purpose
     /// kernel is held up for milliseconds: with two cycles of 1 ms healthy rigs would drop their drive. An amplifier's own
     /// watchdog waits 50 ms, and a newer 'off' replaces an older 'on' at once, so 20 ms never outlive either.

@@ -154,8 +154,13 @@ const REMARKED_SHARE: f64 = 0.85;
 /// What is remarked, worst first.
 pub(super) fn remark(c: &Context<'_>) -> Option<Remark> {
     let sags = c.watch.enabled
-        && c.now.since(c.watch.commanded_since) > response_time(c)
-        && amplitude_pp_m(c).is_some_and(|w| w < 0.7 * c.watch.commanded_pp_m);
+        && match c.watch.envelope.over() {
+            Some(over) => over.shown_pp_m.is_some_and(|w| w < 0.7 * over.mean_pp_m),
+            None => {
+                c.now.since(c.watch.commanded_since) > c.limits.timing.response()
+                    && amplitude_pp_m(c).is_some_and(|w| w < 0.7 * c.watch.commanded_pp_m)
+            }
+        };
     if sags {
         Some(Remark::AmplitudeSags)
     } else if c.watch.lateral.share_came < REMARKED_SHARE {
@@ -339,37 +344,41 @@ fn spikes(c: &Context<'_>) -> u32 {
     c.watch.lateral.spikes_in_window().max(c.watch.normal.spikes_in_window())
 }
 
-/// Time from a new set-point until a fresh state must show it: five ring times, the state's age, two cycles.
-fn response_time(c: &Context<'_>) -> Nanos {
-    let t = &c.limits.timing;
-    Nanos(5 * t.ring_time.0 + 2 * t.amplifier.age_limit().0 + 2 * t.cycle.0)
-}
-
 fn no_response(c: &Context<'_>) -> Option<(f64, f64)> {
-    let driven = c.watch.enabled && c.now.since(c.watch.commanded_since) > response_time(c);
-    let bound = 0.2 * c.watch.commanded_pp_m;
+    // Of an amplitude that changes from cycle to cycle its greatest value is compared with the mean command.
+    let modulated = c.watch.envelope.over();
+    let settled = c.now.since(c.watch.commanded_since) > c.limits.timing.response();
+    let driven = c.watch.enabled && (settled || modulated.is_some());
+    let bound = 0.2 * modulated.map_or(c.watch.commanded_pp_m, |over| over.mean_pp_m);
     // A sensor of the amplitude that is fitted and says nothing is as dead as one that says zero.
     let lost = c.seen.amplifier.is_ok_and(|a| a.amplitude.is_err_and(|why| why != NoData::NotFitted));
     if driven && lost {
         return Some((0.0, bound));
     }
-    amplitude_pp_m(c).filter(|w| driven && *w < bound).map(|w| (w, bound))
+    let shown = modulated.map_or_else(|| amplitude_pp_m(c), |over| over.shown_pp_m);
+    shown.filter(|w| driven && *w < bound).map(|w| (w, bound))
 }
 
 fn echo(c: &Context<'_>) -> Option<(f64, f64, Unit)> {
     let state = c.seen.amplifier.ok()?;
-    if !c.watch.enabled || c.now.since(c.watch.commanded_since) <= response_time(c) {
+    let modulated = c.watch.envelope.over();
+    let settled = c.now.since(c.watch.commanded_since) > c.limits.timing.response();
+    if !(c.watch.enabled && (settled || modulated.is_some())) {
         return None;
     }
     let amplitude = state.echoed_amplitude.metres();
     let wanted = c.watch.commanded_pp_m;
-    if (amplitude - wanted).abs() > 0.02 * wanted + 5e-9 {
-        return Some((amplitude, wanted, Unit::Metre));
+    let [low, high] = modulated.map_or([wanted; 2], |over| over.range_pp_m);
+    let nearest = amplitude.clamp(low, high);
+    if (amplitude - nearest).abs() > 0.02 * nearest + 5e-9 {
+        return Some((amplitude, nearest, Unit::Metre));
     }
     let frequency = state.echoed_frequency_hz;
     let off = (frequency - c.watch.commanded_hz).abs() > 1.0 + 1e-4 * frequency;
     // Another master's 'off' is no harm, but it is another master's; and what is measured then is a plate at rest.
-    let switched = (!state.output_on).then_some((0.0, 1.0, Unit::Flag));
+    // One that is commanded off in between may still show it.
+    let on = low > 0.0 || modulated.is_none();
+    let switched = (on && !state.output_on).then_some((0.0, 1.0, Unit::Flag));
     off.then_some((frequency, c.watch.commanded_hz, Unit::Hertz)).or(switched)
 }
 

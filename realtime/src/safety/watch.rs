@@ -1,5 +1,6 @@
 //! What must be remembered of each channel to judge it: spikes, repeats, gaps, rates.
 
+use super::envelope::Envelope;
 use super::exposure::Exposure;
 use super::{ChannelTiming, Controls, Decision, Limits, Observation};
 use crate::ports::{Channel, Nanos, NoData, Quality, Reading, SupplyCommand};
@@ -192,6 +193,8 @@ pub(super) struct Watch {
     /// m/s over the last two amplitude samples.
     pub amplitude_rate_m_s: f64,
     pub amplitude_fast_in_a_row: u32,
+    /// The amplitudes of the last while, where they change from cycle to cycle.
+    pub envelope: Envelope,
     /// The amplifier's last report of its output.
     amplifier_on: bool,
     /// Highest amplitude commanded within the last ring-down: measured may still be that high.
@@ -262,6 +265,7 @@ impl Watch {
         self.filled += 1;
         self.late[self.bucket] = self.late[self.bucket].saturating_add(missed);
 
+        self.envelope.begin(controls.modulated, timing.response(), now);
         let amplitude = match seen.amplifier {
             Ok(state) => state.amplitude,
             Err(reason) => Err(reason),
@@ -273,8 +277,8 @@ impl Watch {
             if let Some(before) = self.amplitude
                 && reading.sequence != before.sequence
             {
-                let equal =
-                    reading.raw == before.raw && self.enabled && before.taken_at >= self.commanded_since;
+                let stands = before.taken_at >= self.commanded_since || controls.modulated;
+                let equal = reading.raw == before.raw && self.enabled && stands;
                 self.amplitude_equal_in_a_row =
                     if equal { self.amplitude_equal_in_a_row.saturating_add(1) } else { 0 };
                 let dt = reading.taken_at.since(before.taken_at).seconds();
@@ -288,6 +292,7 @@ impl Watch {
                     if saturated { self.amplitude_saturated_in_a_row.saturating_add(1) } else { 0 };
             }
             self.amplitude = Some(reading);
+            self.envelope.shown(reading.value);
         }
         let w = self.amplitude.map_or(0.0, |r| r.value).max(self.commanded_pp_m);
         let velocity_rms_m_s = std::f64::consts::FRAC_1_SQRT_2 * std::f64::consts::PI * w * self.commanded_hz;
@@ -305,9 +310,10 @@ impl Watch {
         // A lower set-point is on its way for as long as it may be sent and its effect may be read; then the
         // plate rings down with its own time constant. The measured amplitude is judged against that.
         let on_its_way = Nanos(timing.command_expiry.0 + timing.amplifier.age_limit().0);
-        if now.since(self.commanded_since) > on_its_way {
+        let recent = self.envelope.over().map(|over| over.range_pp_m[1]);
+        if recent.is_some() || now.since(self.commanded_since) > on_its_way {
             let decay = (-timing.cycle.seconds() / timing.ring_time.seconds().max(1e-9)).exp();
-            self.ringing_pp_m = (self.ringing_pp_m * decay).max(self.commanded_pp_m);
+            self.ringing_pp_m = (self.ringing_pp_m * decay).max(recent.unwrap_or(self.commanded_pp_m));
         }
     }
 
@@ -341,6 +347,7 @@ impl Watch {
         if amplitude != self.commanded_pp_m || drive.frequency_hz() != self.commanded_hz {
             self.commanded_since = now;
         }
+        self.envelope.commanded(amplitude);
         self.commanded_pp_m = amplitude;
         self.commanded_hz = drive.frequency_hz();
         self.ringing_pp_m = self.ringing_pp_m.max(amplitude);

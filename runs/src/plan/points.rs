@@ -162,7 +162,7 @@ impl Plan {
 
     /// Length of stroke that a pass needs in m: settling, averaging, edges, and getting up to speed.
     pub fn stroke_m(&self, speed_m_s: f64, edges: u32) -> f64 {
-        speed_m_s * self.file.pass.sliding_s(edges)[0] * 1.1 + 1e-3
+        speed_m_s * self.file.pass.sliding_s(edges, speed_m_s)[0] * 1.1 + 1e-3
     }
 
     /// Tells of every value of a series that is outside what somebody allows.

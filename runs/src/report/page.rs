@@ -5,7 +5,7 @@ use super::html::{columns, escape, glossary, head, note, shell, table};
 use super::human::number;
 use super::published::Published;
 use super::traces::Trace;
-use super::{events, explore, plots, published};
+use super::{events, explore, fidelity, plots, published};
 use crate::ambient::{AIR, LevelsFound, levels_of};
 use crate::sequence::Outcome;
 use std::fmt::Write;
@@ -17,6 +17,9 @@ pub(super) fn page(run: &RunData, traces: &[Trace], overlay: &[Published]) -> mi
     let title = format!("{} on {}", fact("plan"), fact("setup"));
     let _ = writeln!(w, "<h1>{title}</h1>{}", head(&run.about));
     verdict(w, run);
+    if let Some(rendered) = &run.fidelity {
+        w.push_str(&fidelity::section(rendered)?);
+    }
     w.push_str(&explore::section(run, traces));
     let _ = write!(
         w,

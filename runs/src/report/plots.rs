@@ -4,6 +4,7 @@
 
 pub mod campaign;
 pub mod comparison;
+pub mod fidelity;
 pub mod published;
 pub mod run;
 pub mod verdict;

@@ -74,10 +74,10 @@ impl Sequence {
             self.take(row);
             self.at_rig.during_pass();
         }
-        if row.now.since(since) < Nanos::from_seconds(self.times.measure_s) {
+        let point = self.points[self.next];
+        if row.now.since(since) < Nanos::from_seconds(self.times.measured_s(point.condition.speed_m_s)) {
             return;
         }
-        let point = self.points[self.next];
         let normal = self.sums.normal.mean().unwrap_or(0.0);
         // A pass that was never in contact says nothing about friction.
         if normal < 0.3 * point.condition.normal_force_n {
@@ -164,7 +164,12 @@ impl Sequence {
             temperature_c: if self.at_rig.holds(1) { air.temperature_c } else { sums.temperature.mean() },
             replicate: Some(u64::from(point.replicate)),
             session: self.session,
-            ..Pass::at(u64::from(point.number), &condition, sums.lateral.mean())
+            // What was rendered has no steady friction: its force is in the record, cycle by cycle.
+            ..Pass::at(
+                u64::from(point.number),
+                &condition,
+                sums.lateral.mean().filter(|_| !self.renders(&point.condition)),
+            )
         };
         (pass, levels)
     }

@@ -28,6 +28,9 @@ use std::time::{SystemTime, UNIX_EPOCH};
 /// Name of the file in a record that a replay needs.
 pub const REPLAYABLE: &str = "loop.json";
 
+/// Name of the file in a record that holds the target that was rendered.
+pub const TARGET: &str = "target.json";
+
 /// Name in a record of the model file that led the run: a corrected model, or a law's file.
 pub fn model_name(file: &str, text: &str) -> String {
     if crate::model_file::is_corrected(text) { "model.toml".to_string() } else { format!("law/{file}") }
@@ -96,6 +99,11 @@ pub fn preamble(job: &Job, start_unix_ns: u64) -> miette::Result<Preamble> {
         (job.setup.config, job.setup.tip.finger, job.setup.lateral_passband_hz());
     let replayed = Replayable { config, finger, law, lateral_passband_hz };
     files.push((REPLAYABLE.to_string(), serde_json::to_string_pretty(&replayed).into_diagnostic()?));
+    if let Some(target) = job.model.target() {
+        files.push((TARGET.to_string(), serde_json::to_string(target).into_diagnostic()?));
+        let stated = serde_json::to_string(&job.stated()?).into_diagnostic()?;
+        files.push((crate::fidelity::STATED.to_string(), stated));
+    }
     files.extend(job.model_file.clone());
     files.extend(job.setup.certificates.files.iter().cloned());
     files.extend(job.setup.profiles().into_iter().map(|(name, text)| (format!("profiles/{name}"), text)));
@@ -224,6 +232,7 @@ impl Keeper {
     fn write_end(&self, summary: &Summary) -> miette::Result<()> {
         let text = serde_json::to_vec_pretty(summary).into_diagnostic()?;
         self.dir.write(SUMMARY, &text).wrap_err("the summary")?;
+        crate::fidelity::write(self.dir.path()).wrap_err("the fidelity")?;
         let html = crate::report::html(self.dir.path()).wrap_err("the report")?;
         self.dir.write("report.html", html.as_bytes()).wrap_err("the report")
     }

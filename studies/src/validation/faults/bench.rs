@@ -9,6 +9,7 @@ use runs::supervisor::{Loop, VirtualLoop};
 
 use models::prediction::{FrictionModel, Prediction, SpringSlider};
 use models::quantity::PeakToPeak;
+use models::target::{Rendering, Target};
 use realtime::cycle::{Command, Config, Marker, Phase};
 use realtime::estimate::{EstimateConfig, Mu0};
 use realtime::ports::Nanos;
@@ -28,6 +29,8 @@ pub const T: Nanos = Nanos(1_000_000);
 /// Cycle of the reset, and of the first request.
 const RESET_AT: u64 = 60;
 const REQUEST_AT: u64 = 80;
+/// Cycle from which a target is rendered, where one is.
+const RENDER_AT: u64 = 450;
 /// Cycle from which faults strike: load, speed and amplitude are steady by then.
 pub const STEADY_AT: u64 = 600;
 /// Ring time of the plate: Q = 150 at 27.5 kHz.
@@ -107,6 +110,13 @@ impl FrictionModel for Diverging {
     }
 }
 
+/// A grating of 2 mm over more than the travel, at amplitudes of 1.6 to 2.8 um peak-to-peak.
+fn grating() -> Target {
+    let step_m = 1e-4;
+    let at = |k: i32| 0.28 + 0.05 * (std::f64::consts::PI * f64::from(k) * step_m / 1e-3).sin();
+    Target { start_m: -0.1, step_m, mu_relative: (-1000..=1000).map(at).collect(), feedback: None }
+}
+
 fn time_of(cycle: u64) -> Nanos {
     Nanos(cycle * T.0)
 }
@@ -173,6 +183,7 @@ impl Scene {
             Moment::Idle => Request::default(),
             Moment::Hold => driven(2e-6, 0.0),
             Moment::Slide => driven(2e-6, 0.02),
+            Moment::Render => driven(if cycle < RENDER_AT { 2e-6 } else { 4e-6 }, 0.02),
             // A step of 0.4 um every 50 ms.
             Moment::Ramp => driven(0.4e-6 * (1 + cycle.saturating_sub(450) / 50).min(8) as f64, 0.02),
         }
@@ -213,7 +224,9 @@ impl Scene {
         if cycle >= REQUEST_AT && self.first(|w| w == What::Request).is_none_or(|at| cycle < at) {
             let request = self.request(cycle);
             if request != *before || cycle == REQUEST_AT {
-                out.push(Command::Set(request, Marker { point: 1, phase: Phase::Measure }));
+                let renders = self.moment == Moment::Render && cycle >= RENDER_AT;
+                let command = if renders { Command::Render } else { Command::Set };
+                out.push(command(request, Marker { point: 1, phase: Phase::Measure }));
             }
         }
         out
@@ -262,7 +275,7 @@ pub fn run_with(scene: &Scene, keep: bool, core: Core) -> Found {
     let config = Config { limits, estimate, exposed: Exposed::default() };
     let slider = SpringSlider::new(Finger::paper()).expect("the paper's finger is one");
     let diverges = scene.first(|w| w == What::ModelDiverges).map(time_of);
-    let model = Arc::new(Diverging(slider, diverges));
+    let model = Arc::new(Rendering { law: Arc::new(Diverging(slider, diverges)), target: grating() });
     let rig = VirtualRig::new(&scene.world(), scene.seed).expect("the bench's world can be");
     let [force, amplifier, stage] = rig.split();
     let world = force.clone();
@@ -452,7 +465,11 @@ impl Watch {
         let mut command_off = Vec::new();
         let alone = scene.strikes.len() == 1;
         let timing = scene.pace.timing(T, RING);
-        let may: Vec<Cause> = scene.strikes.iter().flat_map(|s| ROWS[s.row].causes).copied().collect();
+        let mut may: Vec<Cause> = scene.strikes.iter().flat_map(|s| ROWS[s.row].causes).copied().collect();
+        if scene.moment == Moment::Render && may.contains(&Cause::AmplitudeFrozen) {
+            // A reading that stands while the command falls is too high before it counts as frozen.
+            may.push(Cause::AmplitudeRunaway);
+        }
         if let Some(trip) = self.trip.filter(|t| !scene.strikes.is_empty() && !may.contains(&t.cause)) {
             self.wrong.push(format!("tripped for {:?}, which is none of {may:?}", trip.cause));
         }
@@ -482,7 +499,11 @@ impl Watch {
             let tripped = self.off_at.is_some();
             match row.expect {
                 Expect::Off(within) if !already => {
-                    let bound = within.at(&timing);
+                    // A reading that may be late is too high only above all that was commanded meanwhile.
+                    let changes =
+                        scene.moment == Moment::Render && row.causes.contains(&Cause::AmplitudeRunaway);
+                    let meanwhile = if changes { timing.response().0 / T.0 } else { 0 };
+                    let bound = within.at(&timing) + meanwhile;
                     let masked = interact(scene) && off_within_the_slower(self.off_at, &bounds);
                     if !off_in_time(bound) && !masked {
                         late("not off in time", bound);

@@ -24,6 +24,9 @@ pub enum Moment {
     Hold,
     /// Steady sliding under vibration.
     Slide,
+    /// Rendering a grating of friction while it slides: the amplitude changes in every cycle. Not among the
+    /// moments of the rows: every row that may strike while the rig slides may strike then.
+    Render,
 }
 
 /// All moments.

@@ -38,7 +38,7 @@ fn flag(on: bool) -> Option<f64> {
 }
 
 /// The curves, in the order of a viewer's list.
-pub const SIGNALS: [Signal; 24] = [
+pub const SIGNALS: [Signal; 25] = [
     signal("/force/lateral_force_n", "lateral force, signed as the sensor has it", |r| {
         r.inputs.seen.forces.lateral.ok().map(|f| f.value)
     }),
@@ -59,6 +59,9 @@ pub const SIGNALS: [Signal; 24] = [
     }),
     signal("/friction/mu_relative_predicted_sd", "standard uncertainty of the prediction", |r| {
         r.online.map(|o| o.predicted_sd)
+    }),
+    signal("/friction/mu_relative_wanted", "mu' that a rendered target wants at this position", |r| {
+        r.rendered.map(|rendered| rendered.wanted)
     }),
     signal("/friction/residual_z", "measured less predicted, in standard deviations", |r| {
         r.online.map(|o| o.z)

@@ -1,0 +1,303 @@
+//! What a plan renders: a wanted friction over position, generated or from a file.
+
+use super::Plan;
+use crate::fidelity::dynamics::Dynamics;
+use crate::input::{BadInput, Problems, text_of};
+use models::target::{Feedback, MOST_DELAY, Target};
+use rand::{RngExt, SeedableRng};
+use rand_chacha::ChaCha12Rng;
+use serde::{Deserialize, Serialize};
+use std::f64::consts::TAU;
+use std::path::Path;
+
+/// `[render]`: every pass of the plan with an amplitude renders this target; the amplitude of its series is
+/// the largest used.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize, schemars::JsonSchema)]
+#[serde(deny_unknown_fields)]
+pub struct RenderPlan {
+    /// Kind of the target.
+    pub target: Kind,
+    /// Wanted `mu'` in the middle of a grating or of noise, and at the ends of a ramp's middle.
+    #[serde(default = "middle")]
+    pub mean: f64,
+    /// Half the difference of the largest and the smallest wanted `mu'`.
+    #[serde(default = "depth")]
+    pub depth: f64,
+    /// m, period of a grating.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub period_m: Option<f64>,
+    /// m, shortest and longest wave of noise.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub waves_m: Option<[f64; 2]>,
+    /// Power of the wave number with which the noise's amplitude falls: 0 is white.
+    #[serde(default)]
+    pub fall: f64,
+    /// Seed of the noise.
+    #[serde(default)]
+    pub seed: u64,
+    /// CSV file beside the plan, with the columns `x_m` and `mu_relative` or `lateral_force_n`.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub file: Option<String>,
+    /// Difference of `mu'` that counts as rendered.
+    #[serde(default = "tolerance")]
+    pub tolerance: f64,
+    /// Feedback on the measured lateral force.
+    #[serde(default)]
+    pub feedback: Control,
+    /// 1/s, integral gain of the feedback in place of that from the known dynamics.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub integral_per_s: Option<f64>,
+}
+
+/// Kinds of targets.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize, schemars::JsonSchema)]
+#[serde(rename_all = "snake_case")]
+pub enum Kind {
+    /// A sine of `period_m`.
+    Grating,
+    /// From `mean - depth` to `mean + depth` over the stroke.
+    Ramp,
+    /// A sum of sines with random phases.
+    Noise,
+    /// A file.
+    Table,
+}
+
+/// Whether the measured force corrects what is rendered.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize, schemars::JsonSchema)]
+#[serde(rename_all = "snake_case")]
+pub enum Control {
+    /// Open loop: the law alone.
+    #[default]
+    None,
+    /// Proportional and integral, with gains from the known dynamics.
+    Pi,
+}
+
+const fn middle() -> f64 {
+    0.6
+}
+const fn depth() -> f64 {
+    0.2
+}
+const fn tolerance() -> f64 {
+    0.05
+}
+
+/// Sines of a noise.
+const SINES: u32 = 48;
+/// Values of a target in its shortest wave, and over the stroke at least.
+const VALUES: [f64; 2] = [32.0, 400.0];
+/// Values of a target at most.
+const MOST: f64 = 200_000.0;
+
+impl RenderPlan {
+    /// The shortest wave in m that the plan states; none of a ramp or a table.
+    pub fn shortest_m(&self) -> Option<f64> {
+        match self.target {
+            Kind::Grating => self.period_m,
+            Kind::Noise => self.waves_m.map(|waves| waves[0]),
+            Kind::Ramp | Kind::Table => None,
+        }
+    }
+
+    pub(super) fn check(&self, wrong: &mut Problems<'_>) {
+        let mut needs = |key: &str, good: bool, needed: &str| {
+            if !good {
+                wrong.add(&["render", key], format!("[render] {key}: {needed}"), None);
+            }
+        };
+        let length = |m: f64| m.is_finite() && (1e-5..=1.0).contains(&m);
+        let generated = self.target != Kind::Table;
+        let inside = self.mean - self.depth > 0.0 && self.mean + self.depth <= 1.0 && self.depth > 0.0;
+        needs("depth", !generated || inside, "mean - depth must be above 0, mean + depth at most 1");
+        needs(
+            "tolerance",
+            self.tolerance > 0.0 && self.tolerance < 1.0,
+            "a number between 0 and 1 is needed",
+        );
+        needs("fall", (-2.0..=4.0).contains(&self.fall), "a number from -2 to 4 is needed");
+        let grating = self.target == Kind::Grating;
+        needs(
+            "period_m",
+            !grating || self.period_m.is_some_and(length),
+            "a grating needs a period of 10 \u{b5}m to 1 m",
+        );
+        let waves = self.waves_m.is_some_and(|[a, b]| length(a) && length(b) && a < b);
+        let noise = self.target == Kind::Noise;
+        needs("waves_m", !noise || waves, "noise needs the shortest and the longest wave, 10 \u{b5}m to 1 m");
+        let gain = self.integral_per_s.is_none_or(|k| k.is_finite() && k > 0.0);
+        needs("integral_per_s", gain, "a number above 0 is needed");
+        needs("file", generated || self.file.is_some(), "a table needs the name of a CSV file");
+    }
+
+    /// The target over this span in m; `mu0` and load (N) turn a lateral force into `mu'`.
+    fn made(&self, plan: &Plan, span: [f64; 2], mu0: f64) -> miette::Result<Target> {
+        let length = span[1] - span[0];
+        let waves: Vec<[f64; 3]> = match self.target {
+            Kind::Table => return self.read(plan, mu0),
+            Kind::Ramp => Vec::new(),
+            Kind::Grating => vec![[TAU / self.period_m.unwrap_or(length), 1.0, 0.0]],
+            Kind::Noise => {
+                let mut rng = ChaCha12Rng::seed_from_u64(self.seed);
+                let [short, long] = self.waves_m.unwrap_or([length; 2]).map(|m| TAU / m);
+                let each = |i: u32| {
+                    let k = long + (short - long) * (f64::from(i) + rng.random::<f64>()) / f64::from(SINES);
+                    [k, k.powf(-self.fall), TAU * rng.random::<f64>()]
+                };
+                (0..SINES).map(each).collect()
+            }
+        };
+        let step = self.shortest_m().map_or(f64::INFINITY, |m| m / VALUES[0]).min(length / VALUES[1]);
+        let count = ((length / step).ceil() + 1.0).min(MOST);
+        let step_m = length / (count - 1.0);
+        let at = |i: usize| {
+            let x = span[0] + step_m * i as f64;
+            match self.target {
+                Kind::Ramp => 2.0 * (x - span[0]) / length - 1.0,
+                _ => waves.iter().map(|[k, size, phase]| size * (k * x + phase).sin()).sum::<f64>(),
+            }
+        };
+        let mut shape: Vec<f64> = (0..count as usize).map(at).collect();
+        if self.target == Kind::Noise {
+            let most = shape.iter().fold(0.0f64, |most, v| most.max(v.abs()));
+            shape.iter_mut().for_each(|v| *v /= most);
+        }
+        let mu_relative = shape.into_iter().map(|v| self.mean + self.depth * v).collect();
+        Ok(Target { start_m: span[0], step_m, mu_relative, feedback: None })
+    }
+
+    /// A target from its file, on an even grid as fine as the file's smallest step.
+    fn read(&self, plan: &Plan, mu0: f64) -> miette::Result<Target> {
+        let name = self.file.as_deref().unwrap_or_default();
+        let path = Path::new(&plan.origin).parent().unwrap_or(Path::new("")).join(name);
+        let text = text_of(&path)?;
+        let shown = path.display().to_string();
+        let refuse = |problem: String, remedy: &str| -> miette::Report {
+            BadInput::new(&shown, &text, None, problem, remedy.to_string()).into()
+        };
+        let full_n = mu0 * plan.file.base.normal_force_n;
+        let mut lines = text.lines().enumerate().filter(|(_, l)| !l.trim().is_empty() && !l.starts_with('#'));
+        let head = lines.next().map_or("", |(_, l)| l.trim());
+        let scale = match head {
+            "x_m,mu_relative" => 1.0,
+            "x_m,lateral_force_n" => 1.0 / full_n,
+            _ => {
+                let problem = format!("{shown} begins with '{head}'");
+                return Err(refuse(problem, "a target's columns are x_m,mu_relative or x_m,lateral_force_n"));
+            }
+        };
+        let mut points: Vec<[f64; 2]> = Vec::new();
+        for (i, line) in lines {
+            let cells = line.split_once(',').map(|(x, v)| [x, v].map(|c| c.trim().parse::<f64>()));
+            let Some([Ok(x), Ok(v)]) = cells else {
+                return Err(refuse(
+                    format!("{shown}: line {}: '{line}' is not two numbers", i + 1),
+                    "write x_m,value",
+                ));
+            };
+            let mu = v * scale;
+            if !(mu > 0.0 && mu <= 1.0) || points.last().is_some_and(|p| x <= p[0]) {
+                let problem = format!("{shown}: line {}: mu' = {mu} at {x} m", i + 1);
+                return Err(refuse(
+                    problem,
+                    "mu' is above 0 and at most 1, and x_m increases from line to line",
+                ));
+            }
+            points.push([x, mu]);
+        }
+        let [Some(first), Some(last)] = [points.first(), points.last()] else {
+            return Err(refuse(
+                format!("{shown} has no values"),
+                "a target has at least two lines of values",
+            ));
+        };
+        let finest = points.windows(2).map(|p| p[1][0] - p[0][0]).fold(f64::INFINITY, f64::min);
+        let length = last[0] - first[0];
+        let count = (length / finest).ceil() + 1.0;
+        if !(count >= 2.0 && count <= MOST) {
+            return Err(refuse(
+                format!("{shown}: {count} values on its finest step"),
+                "at most 200000, and at least two",
+            ));
+        }
+        let step_m = length / (count - 1.0);
+        let at = |i: usize| {
+            let x = (first[0] + step_m * i as f64).min(last[0]);
+            let k = points.partition_point(|p| p[0] < x).clamp(1, points.len() - 1);
+            let [a, b] = [points[k - 1], points[k]];
+            a[1] + (b[1] - a[1]) * (x - a[0]) / (b[0] - a[0])
+        };
+        Ok(Target {
+            start_m: first[0],
+            step_m,
+            mu_relative: (0..count as usize).map(at).collect(),
+            feedback: None,
+        })
+    }
+}
+
+/// Phase margin in degrees and gain margin that a feedback needs: what the law's slope is off by takes from
+/// the second.
+const MARGINS_MIN: [f64; 2] = [45.0, 2.0];
+
+impl Plan {
+    /// The gains of the plan's feedback on the known dynamics; none in open loop.
+    ///
+    /// # Errors
+    /// A stability margin that is too thin, or a delay that is too long, with the number.
+    pub fn feedback(&self, known: &Dynamics) -> miette::Result<Option<Feedback>> {
+        let Some(render) = self.file.render.as_ref().filter(|r| r.feedback == Control::Pi) else {
+            return Ok(None);
+        };
+        let gains = known.feedback(render.integral_per_s);
+        let [phase, gain] = known.margins(&gains);
+        let long = gains.delay_cycles > MOST_DELAY;
+        if phase < MARGINS_MIN[0] || gain < MARGINS_MIN[1] || long {
+            let problem = format!(
+                "a feedback of {:.0} /s has a phase margin of {phase:.0} degrees and a gain margin of {gain:.1} on this rig (a delay of {} \
+                 cycles); {} degrees, {} and {MOST_DELAY} cycles are needed",
+                gains.integral_per_s, gains.delay_cycles, MARGINS_MIN[0], MARGINS_MIN[1]
+            );
+            let remedy = format!(
+                "leave integral_per_s out, for {:.0} /s, or feedback, for open loop",
+                known.feedback(None).integral_per_s
+            );
+            let place = crate::input::place_of(&self.text, &["render", "integral_per_s"]);
+            return Err(BadInput::new(&self.origin, &self.text, place, problem, remedy).into());
+        }
+        Ok(Some(gains))
+    }
+
+    /// The stroke of the longest pass in m.
+    fn longest_m(&self) -> f64 {
+        let base = self.file.base.speed_m_s;
+        let speeds = self
+            .file
+            .series
+            .iter()
+            .flat_map(|s| if s.speed_m_s.is_empty() { vec![base] } else { s.speed_m_s.clone() });
+        speeds.map(|u| self.stroke_m(u, 0)).fold(0.0, f64::max)
+    }
+
+    /// The target of a plan that renders one.
+    ///
+    /// # Errors
+    /// A file that cannot be used, or that does not cover the stroke of a pass.
+    pub fn target(&self, mu0: f64, feedback: Option<Feedback>) -> miette::Result<Option<Target>> {
+        let Some(render) = &self.file.render else { return Ok(None) };
+        let (middle, half) = (self.file.base.position_m, 0.5 * self.longest_m());
+        let target = render.made(self, [middle - half, middle + half], mu0)?;
+        let [low, high] = target.span_m();
+        if low > middle - half + 1e-3 || high < middle + half - 1e-3 {
+            let [low, high, a, b] = [low, high, middle - half, middle + half].map(|m| m * 1e3);
+            let problem = format!(
+                "the target covers {low:.1} to {high:.1} mm; the passes slide from {a:.1} to {b:.1} mm"
+            );
+            let remedy = "lengthen the target, or shorten [pass] measure_m and settle_s".to_string();
+            let place = crate::input::place_of(&self.text, &["render", "file"]);
+            return Err(BadInput::new(&self.origin, &self.text, place, problem, remedy).into());
+        }
+        Ok(Some(Target { feedback, ..target }))
+    }
+}

@@ -1,0 +1,119 @@
+//! What a page and a terminal say of a rendered target.
+
+use super::html::{escape, list, note, table};
+use super::human::{number, quantity};
+use super::plots::fidelity::{key, over_position, transfer};
+use crate::fidelity::{Fidelity, Group};
+use std::fmt::Write;
+
+/// Groups whose profile is drawn.
+const DRAWN: usize = 3;
+
+/// Where the rendering of a group ends, by name.
+fn ends(group: &Group) -> String {
+    let mut text = match (&group.minus_3_db, group.known_minus_3_db_hz) {
+        (Some(found), Some(known)) => {
+            format!(
+                "-3 dB at {:.1} \u{b1} {:.1} Hz; the known dynamics give {known:.1} Hz",
+                found.hz, found.sd_hz
+            )
+        }
+        (Some(found), None) => format!("-3 dB at {:.1} \u{b1} {:.1} Hz", found.hz, found.sd_hz),
+        (None, Some(known)) => format!("the known dynamics end at {known:.1} Hz"),
+        (None, None) => "the dynamics are not known".into(),
+    };
+    let part =
+        |p: &super::super::fidelity::dynamics::Part| Some(format!("{} {:.0} Hz", p.name, p.corner_hz?));
+    let parts: Vec<String> = group.parts.iter().filter_map(part).collect();
+    if !parts.is_empty() {
+        let _ = write!(text, " (each alone: {})", parts.join(", "));
+    }
+    text
+}
+
+fn shift(group: &Group) -> String {
+    let mm = |way: Option<f64>| way.map_or("none".into(), |way| number(way * 1e3));
+    format!("{} / {}", mm(group.shift_m[0]), mm(group.shift_m[1]))
+}
+
+/// Lines for a terminal.
+pub fn lines(fidelity: &Fidelity) -> Vec<String> {
+    let of = |group: &Group| {
+        let saturated = match group.saturated {
+            0.0 => String::new(),
+            share => format!("; {:.0} % of the way could not be had", 100.0 * share),
+        };
+        [
+            format!(
+                "rendered at {}: mu' off by {:.3} rms ({:.0} % within {}), {:.3} without the shift of {} mm (forward / backward){saturated}",
+                quantity(group.speed_m_s, "m/s"),
+                group.rms,
+                100.0 * group.within_tolerance,
+                fidelity.tolerance,
+                group.rms_shifted,
+                shift(group),
+            ),
+            format!("  {}", ends(group)),
+        ]
+    };
+    fidelity.groups.iter().flat_map(of).chain(fidelity.remarks.iter().cloned()).collect()
+}
+
+/// The section of a run's page.
+///
+/// # Errors
+/// Only if the drawing library fails.
+pub(super) fn section(fidelity: &Fidelity) -> miette::Result<String> {
+    const HEAD: &str = "<th scope=\"col\">U, mm/s</th><th scope=\"col\">load, N</th><th scope=\"col\">passes</th>\
+        <th scope=\"col\">&mu;' off, rms</th><th scope=\"col\">mean</th><th scope=\"col\">within tolerance</th>\
+        <th scope=\"col\">shift, mm</th><th scope=\"col\">rms without it</th><th scope=\"col\">loop and plate, rms</th>\
+        <th scope=\"col\">law and sensor, rms</th><th scope=\"col\">not to be had</th><th scope=\"col\">where it ends</th>";
+    let row = |g: &Group| {
+        format!(
+            "<tr><td>{:.1}</td><td>{}</td><td>{}</td><td>{:.3}</td><td>{:+.3}</td><td>{:.0} %</td><td>{}</td><td>{:.3}</td>\
+             <td>{:.3}</td><td>{:.3}</td><td>{:.0} %</td><td>{}</td></tr>\n",
+            g.speed_m_s * 1e3,
+            number(g.normal_force_n),
+            g.passes,
+            g.rms,
+            g.bias,
+            100.0 * g.within_tolerance,
+            shift(g),
+            g.rms_shifted,
+            g.rms_command,
+            g.rms_law,
+            100.0 * g.saturated,
+            escape(&ends(g)),
+        )
+    };
+    let rows: String = fidelity.groups.iter().map(row).collect();
+    let mut figures = String::new();
+    for group in fidelity.groups.iter().take(DRAWN) {
+        for (places, way) in group.profiles.iter().zip(["forward", "backward"]).filter(|(p, _)| p.len() > 1) {
+            let what = format!("{} {way}", quantity(group.speed_m_s, "m/s"));
+            let _ = write!(
+                figures,
+                "<figure>{}<figcaption>{what}</figcaption></figure>",
+                over_position(places, &what)?
+            );
+        }
+    }
+    let remarks = match fidelity.remarks.is_empty() {
+        true => String::new(),
+        false => list(&fidelity.remarks, ""),
+    };
+    Ok(format!(
+        "<h2>Rendered friction</h2>{}{remarks}<div class=\"panels\">{figures}</div>{}{}{}",
+        table("Fidelity by speed", HEAD, &rows),
+        note(
+            "Grey: wanted &mu;'. Dashed: predicted by the law at the amplitude read back. Line and band: measured, with twice the \
+             standard deviation over the repeats. The shift is the way by which the measurement comes after the target, forward and backward."
+        ),
+        transfer(&fidelity.groups)?,
+        note(&format!(
+            "Gain from wanted to measured &mu;' by Welch's method, with one standard deviation ({}). Line: plate, loop and sensor as they are \
+             known. Spatial frequency is the temporal one over the speed.",
+            escape(&key(&fidelity.groups))
+        )),
+    ))
+}

@@ -1,0 +1,309 @@
+//! Friction on demand on the virtual rig: a grating is rendered and measured, the record replays, the -3 dB
+//! frequency is that of the closed form, what a rig cannot follow is refused with its number.
+
+use realtime::recorder::{CYCLES, Entry, Reader};
+use realtime::turn::Row;
+use runs::fidelity::{Fidelity, dynamics::Dynamics, of_run, read};
+use runs::plan::Plan;
+use runs::session::{Job, Replayable, Signals, TARGET};
+use runs::setup::Setup;
+use std::path::Path;
+use std::sync::Arc;
+
+const HEAD: &str = "name = \"r\"\nseed = 5\nreference_every = 4\n[pass]\nsettle_s = 0.15\nmeasure_m = \"20mm\"\n\
+    [base]\namplitude_pp_m = \"6um\"\nfrequency_hz = \"27.5kHz\"\nspeed_m_s = \"20mm/s\"\nnormal_force_n = \"250mN\"\n";
+
+fn job(out: &Path, render: &str, series: &str) -> Job {
+    let setup = Setup::load("virtual-ideal").unwrap();
+    let text = format!("{HEAD}[render]\n{render}\n[[series]]\n{series}\n");
+    let model = Arc::new(models::prediction::SpringSlider::new(setup.tip.finger).unwrap());
+    Job {
+        setup,
+        plan: Plan::parse("r.toml", &text).unwrap(),
+        seed: 5,
+        model,
+        model_file: None,
+        defects: None,
+        out: out.to_path_buf(),
+        fast: true,
+        notes: Default::default(),
+        answers: None,
+    }
+}
+
+fn rendered(out: &Path, render: &str, series: &str) -> Fidelity {
+    let summary = job(out, render, series).run_in_virtual_time(&Signals::default(), &mut |_| {}).unwrap();
+    assert_eq!(summary.outcome, runs::sequence::Outcome::Complete, "{:?}", summary.outcome);
+    read(out).expect("the run's fidelity")
+}
+
+fn rows(out: &Path) -> (Vec<Row>, Vec<(String, Vec<u8>)>) {
+    let file = std::io::BufReader::new(std::fs::File::open(out.join("run-1.mcap")).unwrap());
+    let (mut rows, mut files) = (Vec::new(), Vec::new());
+    for entry in Reader::new(file).only(CYCLES) {
+        match entry {
+            Entry::Message { text, .. } => rows.push(serde_json::from_slice(&text).unwrap()),
+            Entry::File { name, bytes, .. } => files.push((name, bytes)),
+            Entry::Facts { .. } => {}
+        }
+    }
+    (rows, files)
+}
+
+#[test]
+fn a_grating_is_rendered_and_its_record_replays_bit_for_bit() {
+    let folder = tempfile::tempdir().unwrap();
+    let out = folder.path().join("run");
+    let grating = "target = \"grating\"\nperiod_m = \"2mm\"\nmean = 0.6\ndepth = 0.15";
+    let fidelity = rendered(&out, grating, "speed_m_s = [\"10mm/s\", \"40mm/s\"]");
+    assert_eq!(fidelity.groups.len(), 2);
+    for group in &fidelity.groups {
+        println!(
+            "{} m/s: rms {:.4}, shifted {:.4}, command {:.4}, law {:.4}, shift {:?} m, gain {:?}",
+            group.speed_m_s,
+            group.rms,
+            group.rms_shifted,
+            group.rms_command,
+            group.rms_law,
+            group.shift_m,
+            group.transfer.iter().map(|b| (b.hz, b.gain, b.gain_sd, b.coherence)).collect::<Vec<_>>()
+        );
+        assert_eq!((group.passes, group.saturated), (2, 0.0));
+        // The finger of the virtual rig differs from the law's by its stated scatter, and a pass by 1.5 %.
+        assert!(group.rms_shifted < 0.05, "{group:?}");
+        // The measurement comes later, by the known delays within 1 ms.
+        let late = group.known.unwrap().delay_s() * group.speed_m_s;
+        for way in group.shift_m {
+            assert!((way.unwrap() - late).abs() < 1e-3 * group.speed_m_s + 10e-6, "{way:?} {late}");
+        }
+        let hz = group.speed_m_s / 2e-3;
+        let bin =
+            group.transfer.iter().min_by(|a, b| (a.hz - hz).abs().total_cmp(&(b.hz - hz).abs())).unwrap();
+        let known = group.known.unwrap().gain(bin.hz);
+        assert!((bin.gain / known - 1.0).abs() < 0.1 && bin.coherence > 0.9, "{bin:?} {known}");
+    }
+    assert_eq!(of_run(&out).unwrap(), Some(fidelity), "the record alone gives the same");
+    let page = std::fs::read_to_string(out.join("report.html")).unwrap();
+    assert!(page.contains("Rendered friction") && !page.contains("NaN"));
+
+    let (rows, files) = rows(&out);
+    let file = |name: &str| &files.iter().find(|f| f.0 == name).unwrap().1;
+    let built: Replayable = serde_json::from_slice(file("loop.json")).unwrap();
+    let law = Arc::new(models::prediction::SpringSlider::new(built.finger).unwrap());
+    let law = models::target::Rendering { law, target: serde_json::from_slice(file(TARGET)).unwrap() };
+    let wanted = rows.iter().filter(|row| row.rendered.is_some()).count();
+    let replay = realtime::replay::replay(&built.config, &law, rows);
+    assert!(replay.holds() && wanted > 5000, "{replay:?} {wanted}");
+    // What was rendered has no steady friction, and is not compared as if it had.
+    let passes = runs::run_dir::passes_in(&out).unwrap();
+    assert!(passes.iter().all(|p| p.comparison.is_some() == p.reference), "{passes:?}");
+}
+
+/// Noise of small depth, so that the law is straight: plate, loop and sensor end it where their closed form
+/// does.
+#[test]
+fn rendering_ends_where_the_known_dynamics_say() {
+    let folder = tempfile::tempdir().unwrap();
+    let out = folder.path().join("run");
+    let noise = "target = \"noise\"\nwaves_m = [\"0.24mm\", \"20mm\"]\nmean = 0.7\ndepth = 0.15\nseed = 3";
+    let mut job = job(&out, noise, "speed_m_s = [\"40mm/s\"]");
+    let text = job
+        .plan
+        .text
+        .replace("seed = 5", "seed = 5\nreplicates = 4")
+        .replace("20mm\"\n[base]", "70mm\"\n[base]");
+    job.plan = Plan::parse("r.toml", &text).unwrap();
+    job.run_in_virtual_time(&Signals::default(), &mut |_| {}).unwrap();
+    let fidelity = read(&out).unwrap();
+    let group = &fidelity.groups[0];
+    let known = group.known_minus_3_db_hz.unwrap();
+    let bins: Vec<_> =
+        group.transfer.iter().map(|b| (b.hz, b.gain, group.known.unwrap().gain(b.hz))).collect();
+    println!("-3 dB {:?}, known {known}; {bins:?}", group.minus_3_db);
+    let found = group.minus_3_db.expect("the noise reaches as far");
+    assert!((found.hz / known - 1.0).abs() < 0.1, "{found:?} {known}");
+}
+
+#[test]
+fn what_cannot_be_followed_is_refused_with_its_number() {
+    let folder = tempfile::tempdir().unwrap();
+    let cases = [
+        ("target = \"grating\"\nperiod_m = \"0.1mm\"", "80mm/s", "800 Hz"),
+        ("target = \"grating\"\nperiod_m = \"0.4mm\"", "80mm/s", "of its depth is rendered"),
+        (
+            "target = \"grating\"\nperiod_m = \"2mm\"\nmean = 0.5\ndepth = 0.45",
+            "80mm/s",
+            "mu' = 0.050 is wanted",
+        ),
+        ("target = \"table\"\nfile = \"none.csv\"", "20mm/s", "none.csv"),
+    ];
+    for (render, speed, expected) in cases {
+        let out = folder.path().join("never");
+        let refused = job(&out, render, &format!("speed_m_s = [\"{speed}\"]")).points().unwrap_err();
+        let message = format!("{refused:?}");
+        assert!(message.contains(expected), "{render}: {message}");
+        assert!(!out.exists());
+    }
+    let bad = format!("{HEAD}[render]\ntarget = \"grating\"\ndepth = 0.9\n[[series]]\nspeed_m_s = [0.02]\n");
+    let message = format!("{:?}", Plan::parse("r.toml", &bad).unwrap_err());
+    assert!(message.contains("mean - depth") && message.contains("needs a period"), "{message}");
+}
+
+/// A table is read linearly, in `mu'` or as a lateral force; a dip too short for the rig is named before
+/// the run.
+#[test]
+fn a_table_is_a_target_in_either_unit() {
+    let folder = tempfile::tempdir().unwrap();
+    let setup = Setup::load("virtual-ideal").unwrap();
+    let full_n = setup.tip.mu0 * 0.25;
+    let made = |head: &str, scale: f64| {
+        let points = [(-0.03, 0.5), (-0.01, 0.5), (0.0, 0.8), (0.01, 0.5), (0.03, 0.5)];
+        let lines: String = points.iter().map(|(x, mu)| format!("{x},{}\n", mu * scale)).collect();
+        std::fs::write(folder.path().join("bump.csv"), format!("# a bump\n{head}\n{lines}")).unwrap();
+        let text = format!(
+            "{HEAD}[render]\ntarget = \"table\"\nfile = \"bump.csv\"\n[[series]]\nspeed_m_s = [0.02]\n"
+        );
+        let origin = folder.path().join("plan.toml");
+        let plan = Plan::parse(&origin.display().to_string(), &text).unwrap();
+        plan.target(setup.tip.mu0, None).unwrap().unwrap()
+    };
+    for target in [made("x_m,mu_relative", 1.0), made("x_m,lateral_force_n", full_n)] {
+        for (x, mu) in [(0.0, 0.8), (-5e-3, 0.65), (0.02, 0.5)] {
+            assert!((target.at(x).unwrap() - mu).abs() < 1e-9, "{x} {:?}", target.at(x));
+        }
+    }
+    let known = Dynamics::of(&setup, 27_500.0);
+    assert!((known.ring_time_s - 150.0 / (std::f64::consts::PI * 27_500.0)).abs() < 1e-9, "{known:?}");
+}
+
+/// Gratings of 0.5 to 10 mm at 5 to 100 mm/s, open loop beside feedback: `MUPRIME_LONG=1` prints the whole
+/// table.
+#[test]
+fn gratings_by_period_and_speed_open_loop_and_with_feedback() {
+    let periods = tests::rounds(vec![5.0], vec![0.5, 1.0, 2.0, 5.0, 10.0]);
+    let speeds = tests::rounds(vec![20.0], vec![5.0, 10.0, 20.0, 50.0, 100.0]);
+    println!(
+        "period mm | speed mm/s | Hz | open: rms, shifted, gain | feedback: rms, shifted, gain | known gain"
+    );
+    for period in &periods {
+        for speed in &speeds {
+            let of = |feedback: &str| {
+                let folder = tempfile::tempdir().unwrap();
+                let render = format!(
+                    "target = \"grating\"\nperiod_m = \"{period}mm\"\nmean = 0.6\ndepth = 0.15\nfeedback = \"{feedback}\""
+                );
+                let series = format!("speed_m_s = [\"{speed}mm/s\"]");
+                let refused = job(&folder.path().join("run"), &render, &series).points().err();
+                match refused {
+                    Some(why) => Err(format!("{why}")),
+                    None => Ok(rendered(&folder.path().join("run"), &render, &series).groups.remove(0)),
+                }
+            };
+            let hz = speed / period;
+            match (of("none"), of("pi")) {
+                (Ok(open), Ok(closed)) => {
+                    let gain = |g: &runs::fidelity::Group| {
+                        let off = |b: &&runs::fidelity::Bin| ((b.hz - hz).abs() * 1e6) as u64;
+                        g.transfer.iter().min_by_key(off).map_or(f64::NAN, |b| b.gain)
+                    };
+                    println!(
+                        "{period} | {speed} | {hz:.1} | {:.3}, {:.3}, {:.3} | {:.3}, {:.3}, {:.3} | {:.3}",
+                        open.rms,
+                        open.rms_shifted,
+                        gain(&open),
+                        closed.rms,
+                        closed.rms_shifted,
+                        gain(&closed),
+                        open.known.unwrap().gain(hz)
+                    );
+                    // A slow grating: the law's offset is what feedback takes away.
+                    if hz <= 4.0 {
+                        assert!(
+                            closed.rms < open.rms && closed.bias.abs() < 0.4 * open.bias.abs(),
+                            "{open:?}"
+                        );
+                    }
+                }
+                (Err(why), _) | (_, Err(why)) => println!("{period} | {speed} | {hz:.1} | refused: {why}"),
+            }
+        }
+    }
+}
+
+#[test]
+fn a_feedback_without_margin_is_refused() {
+    let folder = tempfile::tempdir().unwrap();
+    let render = "target = \"grating\"\nperiod_m = \"5mm\"\nmean = 0.6\ndepth = 0.15\nfeedback = \"pi\"\nintegral_per_s = 900";
+    let refused = job(folder.path(), render, "speed_m_s = [0.02]").points().unwrap_err();
+    let message = format!("{refused:?}");
+    assert!(message.contains("phase margin") && message.contains("gain margin"), "{message}");
+}
+
+/// A rig with a withheld effect renders by the slider, is measured and diagnosed, and renders again by the
+/// corrected model, with other noise: the error before and after. 30 sets of each effect with
+/// `MUPRIME_LONG=1`.
+#[test]
+fn the_gap_of_rendering_shrinks_with_the_corrected_model() {
+    let effects = tests::rounds(vec!["squeeze_film"], vec!["squeeze_film", "amplitude_droop", "sensor_lag"]);
+    let grating = "target = \"grating\"\nperiod_m = \"5mm\"\nmean = 0.6\ndepth = 0.15";
+    for effect in effects {
+        let (mut named, mut before_after) = (0, Vec::new());
+        for seed in 1..=tests::rounds(1, 30) {
+            let folder = tempfile::tempdir().unwrap();
+            let at = |name: &str| folder.path().join(name);
+            let render = |out: &str, model: Option<&Path>, seed: u64| {
+                let mut job = job(&at(out), grating, "speed_m_s = [\"20mm/s\"]");
+                if let Some(path) = model {
+                    let loaded = tables::law::for_run(path, &job.setup).unwrap();
+                    (job.model, job.model_file) = (loaded.model, loaded.file);
+                }
+                job.seed = seed;
+                job.defects = sim::defects::Defects::sealed(effect, seed % 1000).ok();
+                let made = job.run_in_virtual_time(&Signals::default(), &mut |_| {}).unwrap();
+                assert_eq!(
+                    made.outcome,
+                    runs::sequence::Outcome::Complete,
+                    "{effect} {seed}: {:?}",
+                    made.outcome
+                );
+                read(&at(out)).unwrap().groups.remove(0)
+            };
+            let mut sweep = job(&at("sweep"), grating, "speed_m_s = [0.02]");
+            sweep.plan = Plan::load("first-sweep").unwrap();
+            (sweep.seed, sweep.defects) = (seed, sim::defects::Defects::sealed(effect, seed).ok());
+            sweep.run_in_virtual_time(&Signals::default(), &mut |_| {}).unwrap();
+            let model = at("model.toml");
+            let words = [
+                "--json",
+                "diagnose",
+                at("sweep").to_str().unwrap(),
+                "--save-model",
+                model.to_str().unwrap(),
+            ]
+            .map(String::from);
+            let output = tests::muprime().args(words).output().unwrap();
+            let verdict = &tests::documents(&output)[0];
+            named += u32::from(verdict["hypotheses"][0]["effects"][0] == effect);
+            let before = render("before", None, 1000 + seed);
+            let after =
+                if model.exists() { render("after", Some(&model), 2000 + seed) } else { before.clone() };
+            before_after.push((before.rms_shifted, after.rms_shifted, before.bias, after.bias));
+        }
+        let middle = |of: fn(&(f64, f64, f64, f64)) -> f64| {
+            let mut all: Vec<f64> = before_after.iter().map(of).collect();
+            all.sort_by(f64::total_cmp);
+            all[all.len() / 2]
+        };
+        println!(
+            "{effect}: {} sets, named {named}; mu' off by {:.3} before, {:.3} after (medians, shift taken out); mean {:+.3}, {:+.3}",
+            before_after.len(),
+            middle(|b| b.0),
+            middle(|b| b.1),
+            middle(|b| b.2),
+            middle(|b| b.3)
+        );
+        if effect == "squeeze_film" {
+            assert!(middle(|b| b.1) < middle(|b| b.0), "{before_after:?}");
+        }
+    }
+}
