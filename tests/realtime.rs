@@ -301,6 +301,7 @@ fn corrected() -> effects::corrected::Corrected {
             law: law.name.into(),
             acts_on: "prediction".into(),
             parameters: parameters.map(saved).collect(),
+            table: None,
             covariance: Vec::new(),
         }],
     })

@@ -507,7 +507,14 @@ proptest! {
                 velocity_m_s: u,
                 normal_force_n: n,
             };
-            let controls = Controls { reset: false, stop: flag, dead_man: !flag, new_request: true, open_supply: flag };
+            let controls = Controls {
+                reset: false,
+                stop: flag,
+                dead_man: !flag,
+                new_request: true,
+                open_supply: flag,
+                modulated: flag,
+            };
             let decision = safety.step(&limits, &observation, &request, controls, Nanos(times[i]));
             prop_assert!(!decision.drive.enable());
             prop_assert_eq!(decision.drive.amplitude(), PeakToPeak::ZERO);

@@ -104,6 +104,14 @@ fn a_row_is_what_the_cycle_said() {
             online: None,
             usable: !cut,
             remark: Some(Remark::AmplitudeSags),
+            rendered: Some(Rendered {
+                wanted: 0.6,
+                amplitude: models::quantity::PeakToPeak::from_metres(1e-6),
+                expected: 0.59,
+                slope_per_m: -3e5,
+                reach: models::inverse::Reach::Within,
+                correction: None,
+            }),
         };
         let row = Row::of(12, Nanos(34), &inputs, &out);
         assert_eq!((row.cycle, row.now, row.inputs), (12, Nanos(34), inputs));
@@ -112,5 +120,6 @@ fn a_row_is_what_the_cycle_said() {
         assert_eq!((row.marker, row.tripped, row.blocking), (out.marker, out.tripped, out.blocking));
         assert_eq!(row.waits_for, out.waits_for);
         assert_eq!((row.mu_relative, row.online, row.remark), (out.mu_relative, out.online, out.remark));
+        assert_eq!(row.rendered, out.rendered);
     }
 }

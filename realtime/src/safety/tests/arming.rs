@@ -3,8 +3,14 @@
 use super::*;
 use crate::ports::SupplyState;
 
-const RESET: Controls =
-    Controls { reset: true, stop: false, dead_man: false, new_request: false, open_supply: false };
+const RESET: Controls = Controls {
+    reset: true,
+    stop: false,
+    dead_man: false,
+    new_request: false,
+    open_supply: false,
+    modulated: false,
+};
 
 /// A rig with a relay that follows its command so many cycles later.
 struct Relayed {
