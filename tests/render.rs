@@ -11,7 +11,7 @@ use std::path::Path;
 use std::sync::Arc;
 
 const HEAD: &str = "name = \"r\"\nseed = 5\nreference_every = 4\n[pass]\nsettle_s = 0.15\nmeasure_m = \"20mm\"\n\
-    [base]\namplitude_pp_m = \"6um\"\nfrequency_hz = \"27.5kHz\"\nspeed_m_s = \"20mm/s\"\nnormal_force_n = \"250mN\"\n";
+    [base]\namplitude_pp_m = \"5.5um\"\nfrequency_hz = \"27.5kHz\"\nspeed_m_s = \"20mm/s\"\nnormal_force_n = \"250mN\"\n";
 
 fn job(out: &Path, render: &str, series: &str) -> Job {
     let setup = Setup::load("virtual-ideal").unwrap();

@@ -61,6 +61,7 @@ pub struct PlanFile {
     pub tolerances: crate::ambient::Tolerances,
     /// What the passes render, where they do not hold an amplitude.
     #[serde(default, skip_serializing_if = "Option::is_none")]
+    #[schemars(with = "RenderPlan")]
     pub render: Option<RenderPlan>,
     /// What a person does before the passes, between groups of them and after; the rig is disarmed meanwhile.
     #[serde(default, skip_serializing_if = "Vec::is_empty")]

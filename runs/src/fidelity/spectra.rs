@@ -198,8 +198,8 @@ mod tests {
     /// White noise through the exact first-order low pass `y' = (x - y)/tau` ends at `1/(2 pi tau)`.
     #[test]
     fn a_first_order_low_pass_ends_where_its_closed_form_does() {
-        let (tau, cycle) = (4e-3, 1e-3);
-        let decay = (-cycle / tau as f64).exp();
+        let (tau, cycle): (f64, f64) = (4e-3, 1e-3);
+        let decay = (-cycle / tau).exp();
         let mut state = 12345u64;
         let mut noise = || {
             state = state.wrapping_mul(6364136223846793005).wrapping_add(1442695040888963407);

@@ -215,7 +215,7 @@ impl RenderPlan {
         let finest = points.windows(2).map(|p| p[1][0] - p[0][0]).fold(f64::INFINITY, f64::min);
         let length = last[0] - first[0];
         let count = (length / finest).ceil() + 1.0;
-        if !(count >= 2.0 && count <= MOST) {
+        if !(2.0..=MOST).contains(&count) {
             return Err(refuse(
                 format!("{shown}: {count} values on its finest step"),
                 "at most 200000, and at least two",
