@@ -52,6 +52,8 @@ pub const MOST_EVALUATIONS: u32 = 40;
 const CLOSE: f64 = 2e-5;
 /// Width of the bracket in m at which a jump of a law is taken for the answer.
 const NARROW_M: f64 = 1e-13;
+/// What an answer may be off by before it is one at a jump.
+const JUMP: f64 = 1e-3;
 /// Where to begin without an earlier answer, and what is tried where a law has none there, as shares of the
 /// largest amplitude.
 const STARTS: [f64; 4] = [0.25, 1.0, 0.05, 0.01];
@@ -193,7 +195,9 @@ pub fn quick(
         Some(_) if mu > 0.0 && mu < 1.0 && w > 0.0 => (1.0 - mu) * -(-mu).ln_1p() * search.slope / w,
         _ => search.per_m,
     };
-    answer(w, mu, slope, Reach::Within, evaluations)
+    // At a jump of the law no amplitude gives what is wanted.
+    let reach = if (mu - wanted).abs() > JUMP { Reach::BeyondLaw } else { Reach::Within };
+    answer(w, mu, slope, reach, evaluations)
 }
 
 #[cfg(test)]
