@@ -32,7 +32,7 @@ pub struct Options {
     pub pairs: bool,
     /// Effects that are left out of the library (for leave-one-effect-out tests).
     pub without: Vec<String>,
-    /// Effects of the user's own that are tried beside the library, by their numbers ([`effects::own`]).
+    /// Effects of the user's own that are tried beside the library, by their numbers ([`effects::own()`]).
     pub own: Vec<usize>,
     /// Receives the progress of the diagnosis.
     pub progress: Progress,

@@ -44,7 +44,7 @@ impl Variable {
     }
 }
 
-/// So many of the variables, the first, are those that a law may depend on; a candidate effect may depend on all.
+/// So many of the variables, the first, are those that a law may depend on; an effect may depend on all.
 pub const OF_LAWS: usize = 5;
 
 /// The variables in their order.

@@ -1,8 +1,9 @@
 //! A candidate cause of a user's own, as data: a table of how friction changes over the conditions.
 //!
 //! The table is a full grid like that of a law ([`models::law_table`]). Its answer `friction_change` is the
-//! relative change of friction at size 1: the reading is that of the contact times `1 + size * friction_change`.
-//! Beyond its grid it cannot tell, and the reading is not a number. Comments before the header state the rest:
+//! relative change of friction at size 1: the reading is that of the contact times
+//! `1 + size * friction_change`. Beyond its grid it cannot tell, and the reading is not a number. Comments
+//! before the header state the rest:
 //!
 //! ```text
 //! # place: contact
@@ -59,8 +60,8 @@ impl OwnTable {
     }
 }
 
-/// Effects are known by their number wherever hypotheses are spelled, and are compared by it. So one that comes as
-/// data gets a number for as long as the program runs; the same name and text get the same one.
+/// Effects are known by their number wherever hypotheses are spelled, and are compared by it. So one that
+/// comes as data gets a number for as long as the program runs; the same name and text get the same one.
 static OWN: RwLock<Vec<&'static Effect>> = RwLock::new(Vec::new());
 
 /// The effect of that number: of the library, of the open set, or one's own.
@@ -77,7 +78,8 @@ pub fn at(number: usize) -> &'static Effect {
 /// Reads a user's own effect; its number.
 ///
 /// # Errors
-/// A name that is not made of letters, digits and `_`, or one of the library; a table that is refused, with its line.
+/// A name that is not made of letters, digits and `_`, or one of the library; a table that is refused, with
+/// its line.
 pub fn own(name: &str, text: &str) -> Result<usize, String> {
     let plain = |c: char| c.is_ascii_lowercase() || c.is_ascii_digit() || c == '_';
     if name.is_empty() || name.len() > LONGEST || !name.chars().all(plain) {
