@@ -100,28 +100,30 @@ fn a_grating_is_rendered_and_its_record_replays_bit_for_bit() {
 }
 
 /// Noise of small depth, so that the law is straight: plate, loop and sensor end it where their closed form
-/// does.
+/// does. One draw of the noise scatters by 3 %: the mean of several is compared.
 #[test]
 fn rendering_ends_where_the_known_dynamics_say() {
     let folder = tempfile::tempdir().unwrap();
-    let out = folder.path().join("run");
-    let noise = "target = \"noise\"\nwaves_m = [\"0.24mm\", \"20mm\"]\nmean = 0.7\ndepth = 0.15\nseed = 3";
-    let mut job = job(&out, noise, "speed_m_s = [\"40mm/s\"]");
-    let text = job
-        .plan
-        .text
-        .replace("seed = 5", "seed = 5\nreplicates = 4")
-        .replace("20mm\"\n[base]", "70mm\"\n[base]");
-    job.plan = Plan::parse("r.toml", &text).unwrap();
-    job.run_in_virtual_time(&Signals::default(), &mut |_| {}).unwrap();
-    let fidelity = read(&out).unwrap();
-    let group = &fidelity.groups[0];
-    let known = group.known_minus_3_db_hz.unwrap();
-    let bins: Vec<_> =
-        group.transfer.iter().map(|b| (b.hz, b.gain, group.known.unwrap().gain(b.hz))).collect();
-    println!("-3 dB {:?}, known {known}; {bins:?}", group.minus_3_db);
-    let found = group.minus_3_db.expect("the noise reaches as far");
-    assert!((found.hz / known - 1.0).abs() < 0.1, "{found:?} {known}");
+    let corner = |seed: u64| {
+        let out = folder.path().join(seed.to_string());
+        let noise = format!(
+            "target = \"noise\"\nwaves_m = [\"0.24mm\", \"20mm\"]\nmean = 0.7\ndepth = 0.15\nseed = {seed}"
+        );
+        let mut job = job(&out, &noise, "speed_m_s = [\"40mm/s\"]");
+        let text = job.plan.text.replace("seed = 5", &format!("seed = {seed}\nreplicates = 4"));
+        job.plan = Plan::parse("r.toml", &text.replace("20mm\"\n[base]", "70mm\"\n[base]")).unwrap();
+        job.seed = seed;
+        job.run_in_virtual_time(&Signals::default(), &mut |_| {}).unwrap();
+        let group = read(&out).unwrap().groups.remove(0);
+        let found = group.minus_3_db.expect("the noise reaches as far");
+        println!("-3 dB {found:?}, known {:?}", group.known_minus_3_db_hz);
+        found.hz / group.known_minus_3_db_hz.unwrap()
+    };
+    let seeds = tests::rounds(4, 24);
+    let ratios: Vec<f64> = (1..=seeds).map(corner).collect();
+    let mean = ratios.iter().sum::<f64>() / ratios.len() as f64;
+    assert!((mean - 1.0).abs() < 0.05, "{mean}: {ratios:?}");
+    assert!(ratios.iter().all(|ratio| (ratio - 1.0).abs() < 0.12), "{ratios:?}");
 }
 
 #[test]
