@@ -110,7 +110,7 @@ fn rendering_ends_where_the_known_dynamics_say() {
             "target = \"noise\"\nwaves_m = [\"0.24mm\", \"20mm\"]\nmean = 0.7\ndepth = 0.15\nseed = {seed}"
         );
         let mut job = job(&out, &noise, "speed_m_s = [\"40mm/s\"]");
-        let text = job.plan.text.replace("seed = 5", &format!("seed = {seed}\nreplicates = 4"));
+        let text = job.plan.text.replacen("seed = 5", &format!("seed = {seed}\nreplicates = 4"), 1);
         job.plan = Plan::parse("r.toml", &text.replace("20mm\"\n[base]", "70mm\"\n[base]")).unwrap();
         job.seed = seed;
         job.run_in_virtual_time(&Signals::default(), &mut |_| {}).unwrap();
