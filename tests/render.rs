@@ -97,6 +97,10 @@ fn a_grating_is_rendered_and_its_record_replays_bit_for_bit() {
     // What was rendered has no steady friction, and is not compared as if it had.
     let passes = runs::run_dir::passes_in(&out).unwrap();
     assert!(passes.iter().all(|p| p.comparison.is_some() == p.reference), "{passes:?}");
+    let refused = tests::muprime().arg("diagnose").arg(&out).output().unwrap();
+    let (_, said) = tests::texts(&refused);
+    let said = said.split_whitespace().collect::<Vec<_>>().join(" ");
+    assert!(refused.status.code() == Some(2) && said.contains("diagnose a sweep"), "{said}");
 }
 
 /// Noise of small depth, so that the law is straight: plate, loop and sensor end it where their closed form

@@ -90,7 +90,12 @@ pub fn run(args: Args, json: bool) -> miette::Result<ExitCode> {
         .wrap_err_with(|| format!("cannot read the table {}", table_path.display()))?;
     let passes = parse_passes(&table_path, &bytes)?;
     let shown = || table_path.display().to_string();
-    let whole = Table::measured(&passes).into_diagnostic().wrap_err_with(shown)?;
+    let rendered = args.data.join(runs::fidelity::FILE).is_file();
+    let whole = Table::measured(&passes).map_err(|why| {
+        let help = "passes that render have no steady friction: diagnose a sweep of the same rig, and give its corrected model to the rendering";
+        if rendered { miette::miette!(help = help, "{why}") } else { miette::Report::msg(why) }
+    });
+    let whole = whole.wrap_err_with(shown)?;
     let (law, table) = match &args.model {
         None => (None, whole),
         Some(what) => {

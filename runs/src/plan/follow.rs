@@ -123,7 +123,7 @@ impl Plan {
         }
     }
 
-    /// The frequencies at which the target passes by, beside what loop, plate, sensor and pad leave of them.
+    /// The frequencies of the target at the speeds of the passes, beside what loop, plate, sensor and pad leave of them.
     fn frequencies(
         &self,
         demand: &Demand,
@@ -135,7 +135,7 @@ impl Plan {
     ) {
         let (speed, period) = (quantity(c.speed_m_s, "m/s"), quantity(demand.period_m, "m"));
         let hz = c.speed_m_s / demand.period_m;
-        let passes = format!("{period} at {speed} passes by at {} Hz", number(hz));
+        let passes = format!("a period of {period} at {speed} is {} Hz", number(hz));
         let place = || {
             place_of(&self.text, &["render", "period_m"])
                 .or_else(|| place_of(&self.text, &["render", "target"]))
