@@ -308,7 +308,7 @@ fn without_a_terminal_there_is_no_key() {
     let rig = ServedRig::of("virtual-relay", 1, None);
     let file = folder.path().join("setup.toml");
     std::fs::write(&file, setup(&rig, "")).unwrap();
-    for (more, why) in [(&[][..], "no terminal"), (&["--fast"][..], "--fast")] {
+    for (more, why) in [(&[][..], "is not a terminal"), (&["--fast"][..], "--fast")] {
         let mut sweep = muprime();
         sweep.args(["run", "first-sweep", "--setup"]).arg(&file).args(more).stdin(Stdio::null());
         let output = sweep.arg("--out").arg(folder.path().join("never")).output().unwrap();
