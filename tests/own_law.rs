@@ -524,7 +524,7 @@ fn dipped(at: &Path, seed: u64, size: f64) -> sim::sealed::Set {
     set
 }
 
-/// An effect of one's own, as a table, on data of another simulation: named with its size where it is there, not
+/// An effect of the user's own, as a table, on data of another simulation: named with its size where it is there, not
 /// named where it is not, in a corrected model and its predictions.
 #[test]
 fn an_effect_of_ones_own_is_one_more_hypothesis() {

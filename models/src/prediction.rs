@@ -126,6 +126,36 @@ pub trait FrictionModel: Send + Sync {
     }
 }
 
+/// What a law that wraps another in its field `law` answers as that one does.
+macro_rules! as_its_law {
+    () => {
+        fn predict(&self, condition: &Condition) -> Result<Prediction, OutOfDomain> {
+            self.law.predict(condition)
+        }
+
+        fn relative_friction(&self, condition: &Condition) -> Result<RelativeFriction, OutOfDomain> {
+            self.law.relative_friction(condition)
+        }
+
+        fn mu_relative(&self, condition: &Condition) -> Result<f64, OutOfDomain> {
+            self.law.mu_relative(condition)
+        }
+
+        fn parameter_relative_sd(&self) -> [f64; 2] {
+            self.law.parameter_relative_sd()
+        }
+
+        fn mu_relative_with(&self, condition: &Condition, deviation: [f64; 2]) -> Result<f64, OutOfDomain> {
+            self.law.mu_relative_with(condition, deviation)
+        }
+
+        fn form_sd(&self, of: &Prediction) -> f64 {
+            self.law.form_sd(of)
+        }
+    };
+}
+pub(crate) use as_its_law;
+
 /// The spring-slider with a finger's stiffnesses and their uncertainty.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct SpringSlider {

@@ -1,7 +1,7 @@
 //! A wanted friction over position, and a law together with it: what a loop renders.
 
 use crate::condition::{Condition, OutOfDomain};
-use crate::prediction::{FrictionModel, Prediction, RelativeFriction};
+use crate::prediction::{FrictionModel, Prediction, RelativeFriction, as_its_law};
 use serde::{Deserialize, Serialize};
 use std::sync::Arc;
 
@@ -70,29 +70,7 @@ impl FrictionModel for Rendering {
         self.law.name()
     }
 
-    fn predict(&self, condition: &Condition) -> Result<Prediction, OutOfDomain> {
-        self.law.predict(condition)
-    }
-
-    fn relative_friction(&self, condition: &Condition) -> Result<RelativeFriction, OutOfDomain> {
-        self.law.relative_friction(condition)
-    }
-
-    fn mu_relative(&self, condition: &Condition) -> Result<f64, OutOfDomain> {
-        self.law.mu_relative(condition)
-    }
-
-    fn parameter_relative_sd(&self) -> [f64; 2] {
-        self.law.parameter_relative_sd()
-    }
-
-    fn mu_relative_with(&self, condition: &Condition, deviation: [f64; 2]) -> Result<f64, OutOfDomain> {
-        self.law.mu_relative_with(condition, deviation)
-    }
-
-    fn form_sd(&self, of: &Prediction) -> f64 {
-        self.law.form_sd(of)
-    }
+    as_its_law!();
 
     fn sha256(&self) -> Option<&str> {
         self.law.sha256()

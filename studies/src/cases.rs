@@ -1,5 +1,5 @@
 //! Studies of many cases, on one machine or on the engine of an institute: a file of cases, an idempotent worker, what it writes,
-//! and how that becomes one table. There is no scheduler here: an engine that stands (`engines`) runs the worker.
+//! and how that becomes one table. There is no scheduler here: an engine of the institute (`engines`) runs the worker.
 //! What is written is Parquet: all but [`file`](mod@file), [`run`] and [`kinds`] need the feature `cases`.
 //!
 //! | part | holds |

@@ -92,7 +92,8 @@ pub fn run(args: Args, json: bool) -> miette::Result<ExitCode> {
     let shown = || table_path.display().to_string();
     let rendered = args.data.join(runs::fidelity::FILE).is_file();
     let whole = Table::measured(&passes).map_err(|why| {
-        let help = "passes that render have no steady friction: diagnose a sweep of the same rig, and give its corrected model to the rendering";
+        let help = "passes that render have no steady friction: diagnose a sweep of the same rig, and give its \
+                    corrected model to the rendering";
         if rendered { miette::miette!(help = help, "{why}") } else { miette::Report::msg(why) }
     });
     let whole = whole.wrap_err_with(shown)?;

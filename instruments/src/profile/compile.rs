@@ -70,7 +70,7 @@ impl Compiler<'_> {
         ProfileError::at(self.text, Some(span), message)
     }
 
-    /// A refusal of what stands under a name.
+    /// A refusal of what has this name.
     pub(super) fn at_name(&self, name: &toml::Spanned<String>, message: impl Into<String>) -> ProfileError {
         self.at(name.span(), message)
     }
@@ -415,9 +415,10 @@ impl Compiler<'_> {
             return Err(wrong(why));
         }
         if let Some(Form::Pattern(pattern)) = &frame.text {
-            let at = pattern.fields().position(|(field, _)| field == name).ok_or_else(|| {
-                wrong(format!("signal `{name}` does not stand in the line of `{}`", frame.name))
-            })?;
+            let at = pattern
+                .fields()
+                .position(|(field, _)| field == name)
+                .ok_or_else(|| wrong(format!("signal `{name}` is not in the line of `{}`", frame.name)))?;
             let (number, order) = (NumberType::F64, ByteOrder::Abcd);
             return Ok(Place::Bytes(Field { at: 8 * at, number, order, bits: None }));
         }

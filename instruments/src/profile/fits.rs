@@ -126,7 +126,7 @@ impl Compiler<'_> {
                 }
                 if file.contains(['/', '\\']) {
                     return Err(
-                        self.at_text("[link]", format!("`{key}`: the file stands beside the profile"))
+                        self.at_text("[link]", format!("`{key}`: the file must be beside the profile"))
                     );
                 }
             }

@@ -64,7 +64,7 @@ impl OwnTable {
 /// comes as data gets a number for as long as the program runs; the same name and text get the same one.
 static OWN: RwLock<Vec<&'static Effect>> = RwLock::new(Vec::new());
 
-/// The effect of that number: of the library, of the open set, or one's own.
+/// The effect of that number: of the library, of the open set, or of the user.
 ///
 /// # Panics
 /// A number that nobody was given.
@@ -110,9 +110,10 @@ pub fn own(name: &str, text: &str) -> Result<usize, String> {
         .and_then(|sd| if sd > 0.0 && sd.is_finite() { Ok(sd) } else { Err(sd.to_string()) });
     let sd = sd.map_err(|text| format!("size_sd '{text}': a number above zero is needed"))?;
     let change = LawTable::answering(&CHANGE, text).map_err(|why| why.to_string())?;
-    // For as long as the program runs: a diagnosis keeps effects by reference, and one's own are few.
+    // For as long as the program runs: a diagnosis holds effects by reference, and a user's own are few.
     let size = Parameter::signed("size", "1", sd, -FARTHEST * sd, FARTHEST * sd);
-    let summary = stated("summary:").unwrap_or_else(|| "Friction changes by one's own table.".into());
+    let summary =
+        stated("summary:").unwrap_or_else(|| "Friction changes by a table of the user's own.".into());
     let effect = Effect {
         name: name.to_string().leak(),
         place,
@@ -126,7 +127,7 @@ pub fn own(name: &str, text: &str) -> Result<usize, String> {
     Ok(KNOWN.len() + all.len() - 1)
 }
 
-/// The effect of that name: of the library, or the latest of one's own.
+/// The effect of that name: of the library, or the latest of the user.
 pub fn by_name(name: &str) -> Option<&'static Effect> {
     let own = || {
         let all = OWN.read().unwrap_or_else(PoisonError::into_inner);

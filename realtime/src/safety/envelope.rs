@@ -1,5 +1,5 @@
 //! The amplitudes of the last while, where a target is rendered: a set-point that changes from cycle to
-//! cycle never stands long enough for the rules that wait for it. They judge the range of what was
+//! cycle is never constant long enough for the rules that wait for it. They judge the range of what was
 //! commanded instead.
 #![deny(clippy::disallowed_types, clippy::disallowed_methods)]
 

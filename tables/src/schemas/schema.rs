@@ -13,7 +13,7 @@ pub enum Kind {
     Plan,
     /// A campaign (TOML): one plan with several tips, conditions and days, for `muprime run CAMPAIGN`
     Campaign,
-    /// A rig (TOML), for `--setup`; the defaults and hard ranges of its limits stand in setup.md as well
+    /// A rig (TOML), for `--setup`; the defaults and hard ranges of its limits are in setup.md as well
     Setup,
     /// A fingertip (TOML), for `[finger] tip` of a setup
     Fingertip,

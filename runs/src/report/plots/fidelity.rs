@@ -54,7 +54,7 @@ pub fn transfer(groups: &[Group]) -> miette::Result<String> {
     })
 }
 
-/// Which mark stands for which speed.
+/// The mark of each speed.
 pub fn key(groups: &[Group]) -> String {
     series_key(&groups.iter().map(|g| number(g.speed_m_s * 1e3)).collect::<Vec<_>>(), "mm/s")
 }
