@@ -329,7 +329,7 @@ fn the_inverse_meets_what_is_wanted_at_scattered_conditions_without_allocation()
     let count = tests::rounds(10_000, 1_000_000);
     let largest = PeakToPeak::from_metres(8e-6);
     for (name, law) in laws {
-        let (mut off, mut asked, mut last) = (Vec::with_capacity(count), 0u64, PeakToPeak::ZERO);
+        let (mut off, mut asked, mut last) = (Vec::with_capacity(count), 0u64, None);
         let mut unreached = [0u32; 3];
         COUNT.set(0);
         for k in 1..=count as u64 {
@@ -342,14 +342,14 @@ fn the_inverse_meets_what_is_wanted_at_scattered_conditions_without_allocation()
             };
             let wanted = 0.1 + 0.85 * part(k, 0.819_173);
             COUNTING.set(true);
-            let found = quick(&*law, &condition, wanted, largest, last);
+            let found = quick(&*law, &condition, wanted, largest, last.as_ref());
             COUNTING.set(false);
             let found = found.expect("every law answers here");
             asked += u64::from(found.evaluations);
             assert!(found.evaluations <= MOST_EVALUATIONS);
             match found.reach {
                 Reach::Within => {
-                    last = found.amplitude;
+                    last = Some(found);
                     let again =
                         law.mu_relative(&Condition { amplitude: found.amplitude, ..condition }).unwrap();
                     off.push((again - wanted).abs());

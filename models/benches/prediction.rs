@@ -42,17 +42,21 @@ fn spring_slider_in_five_solutions(bencher: divan::Bencher) {
     });
 }
 
-/// A law table of five variables with its uncertainty, at scattered conditions: its time over the
-/// spring-slider's is the ratio that counts.
-#[divan::bench(sample_size = 200)]
-fn law_table(bencher: divan::Bencher) {
+fn table() -> LawTable {
     let words =
         ["amplitude_pp_m=0.2e-6..6e-6:25:log", "frequency_hz=20e3..60e3:5", "speed_m_s=0.002..0.2:13:log"];
     let grid = Grid::parse(words.into_iter().chain(["normal_force_n=0.1..1:7:log", "mu0=0.2..1:3"]))
         .expect("a grid");
     let mu = |c: &Vec<f64>| [1.0 / (1.0 + c[0] * c[1] * c[4] / c[2]), 0.02];
     let answers: Vec<_> = grid.conditions(0).iter().map(mu).collect();
-    let law = LawTable::from_csv(&grid.table(0, &answers).expect("a table").csv).expect("a law");
+    LawTable::from_csv(&grid.table(0, &answers).expect("a table").csv).expect("a law")
+}
+
+/// A law table of five variables with its uncertainty, at scattered conditions: its time over the
+/// spring-slider's is the ratio that counts.
+#[divan::bench(sample_size = 200)]
+fn law_table(bencher: divan::Bencher) {
+    let law = table();
     let conditions: Vec<Condition> = (0..1024)
         .map(|k| {
             let part = |step: f64| (f64::from(k) * step).fract();
@@ -76,29 +80,46 @@ fn law_table(bencher: divan::Bencher) {
 /// before.
 fn inverse(bencher: divan::Bencher, law: &dyn FrictionModel) {
     let wanted: Vec<f64> = (0..50).map(|k| 0.6 + 0.15 * (2.0 * PI * f64::from(k) / 50.0).sin()).collect();
-    let (mut k, mut last) = (0, PeakToPeak::ZERO);
+    let (mut k, mut last) = (0, None);
     bencher.bench_local(|| {
         k = (k + 1) % wanted.len();
-        let found =
-            quick(law, black_box(&Condition::paper()), wanted[k], PeakToPeak::from_metres(8e-6), last);
-        last = found.map_or(last, |found| found.amplitude);
+        let found = quick(
+            law,
+            black_box(&Condition::paper()),
+            wanted[k],
+            PeakToPeak::from_metres(8e-6),
+            last.as_ref(),
+        );
+        last = found.or(last);
         found
     });
 }
 
-#[divan::bench]
+#[divan::bench(sample_size = 200)]
 fn inverse_spring_slider(bencher: divan::Bencher) {
     inverse(bencher, &SpringSlider::new(finger()).expect("a finger"));
 }
 
-#[divan::bench]
+#[divan::bench(sample_size = 200)]
 fn inverse_psi(bencher: divan::Bencher) {
     inverse(bencher, &EmpiricalPsi::paper(finger()).expect("a finger"));
 }
 
-#[divan::bench]
+#[divan::bench(sample_size = 200)]
 fn inverse_surrogate(bencher: divan::Bencher) {
     inverse(bencher, &Surrogate::shipped().expect("the shipped table").for_finger(&finger()));
+}
+
+/// A finger that recovers slowly: each evaluation seeks a cycle that repeats itself.
+#[divan::bench(sample_size = 200)]
+fn inverse_recovering_spring_slider(bencher: divan::Bencher) {
+    let finger = Finger { lateral_recovery_m_per_s: Some(5e-3), ..finger() };
+    inverse(bencher, &SpringSlider::new(finger).expect("a finger"));
+}
+
+#[divan::bench(sample_size = 200)]
+fn inverse_law_table(bencher: divan::Bencher) {
+    inverse(bencher, &table());
 }
 
 #[divan::bench]

@@ -3,6 +3,7 @@
 use crate::condition::{Condition, OutOfDomain};
 use crate::finger::Finger;
 use crate::psi::{self, PsiEq17};
+use crate::quantity::PeakToPeak;
 use crate::reading::Reading;
 use crate::spring_slider;
 use serde::{Deserialize, Serialize};
@@ -87,6 +88,13 @@ pub trait FrictionModel: Send + Sync {
         self.relative_friction(condition).map(|friction| friction.mu_relative)
     }
 
+    /// The amplitude for a wanted `mu'` at a condition, whose own amplitude does not count, and the slope
+    /// `d mu'/dw` there in 1/m, where the law can be turned round without a search.
+    fn amplitude_for(&self, condition: &Condition, wanted: f64) -> Option<(PeakToPeak, f64)> {
+        let _ = (condition, wanted);
+        None
+    }
+
     /// Relative standard deviations of the two parameters that a calibration leaves uncertain (normal and
     /// lateral stiffness, or what takes their place). Zero: the law has none.
     fn parameter_relative_sd(&self) -> [f64; 2] {
@@ -139,6 +147,14 @@ macro_rules! as_its_law {
 
         fn mu_relative(&self, condition: &Condition) -> Result<f64, OutOfDomain> {
             self.law.mu_relative(condition)
+        }
+
+        fn amplitude_for(
+            &self,
+            condition: &Condition,
+            wanted: f64,
+        ) -> Option<($crate::quantity::PeakToPeak, f64)> {
+            self.law.amplitude_for(condition, wanted)
         }
 
         fn parameter_relative_sd(&self) -> [f64; 2] {
@@ -198,6 +214,11 @@ impl FrictionModel for SpringSlider {
     fn mu_relative(&self, condition: &Condition) -> Result<f64, OutOfDomain> {
         condition.check()?;
         Ok(spring_slider::solve_checked(condition, &self.finger).mu_relative)
+    }
+
+    fn amplitude_for(&self, condition: &Condition, wanted: f64) -> Option<(PeakToPeak, f64)> {
+        condition.check().ok()?;
+        spring_slider::amplitude_for(condition, &self.finger, wanted)
     }
 
     fn parameter_relative_sd(&self) -> [f64; 2] {

@@ -70,6 +70,18 @@ pub fn newton(mut f: impl FnMut(f64) -> (f64, f64), lo: f64, hi: f64, start: f64
         return if at_lo.abs() <= at_hi.abs() { lo } else { hi };
     }
     let tolerance = 4.0 * f64::EPSILON * lo.abs().max(hi.abs());
+    newton_between(f, at_lo < 0.0, [lo, hi], start, tolerance)
+}
+
+/// [`newton`] where `f` is known to rise or to fall through zero between the ends, which it then need not
+/// evaluate. It ends with the first step of at most `tolerance`.
+pub fn newton_between(
+    mut f: impl FnMut(f64) -> (f64, f64),
+    rises: bool,
+    [lo, hi]: [f64; 2],
+    start: f64,
+    tolerance: f64,
+) -> f64 {
     let (mut low, mut high) = (lo, hi);
     let mut x = if start > lo && start < hi { start } else { 0.5 * (lo + hi) };
     let mut last = hi - lo;
@@ -78,7 +90,7 @@ pub fn newton(mut f: impl FnMut(f64) -> (f64, f64), lo: f64, hi: f64, start: f64
         if value == 0.0 {
             return x;
         }
-        if (value > 0.0) == (at_lo > 0.0) {
+        if (value < 0.0) == rises {
             low = x
         } else {
             high = x
@@ -96,9 +108,48 @@ pub fn newton(mut f: impl FnMut(f64) -> (f64, f64), lo: f64, hi: f64, start: f64
     x
 }
 
+/// The root of an `f` that falls through zero between the ends, by secants within the bracket, from `start`
+/// and then from `start + f(start)`: the next value where `f` is the change that a map makes. It ends where
+/// `f`, or the bracket, is below `settled`; the root is where `f` was evaluated last.
+pub fn secant(mut f: impl FnMut(f64) -> f64, [mut low, mut high]: [f64; 2], start: f64, settled: f64) -> f64 {
+    let (mut x, mut last) = (start, None::<(f64, f64)>);
+    for _ in 0..60 {
+        let gap = f(x);
+        if gap.abs() < settled {
+            break;
+        }
+        if gap > 0.0 {
+            low = x
+        } else {
+            high = x
+        }
+        if high - low < settled {
+            break;
+        }
+        let next = match last {
+            Some((x0, gap0)) if gap0 != gap => x - gap * (x - x0) / (gap - gap0),
+            _ => x + gap,
+        };
+        last = Some((x, gap));
+        x = if next > low && next < high { next } else { 0.5 * (low + high) };
+    }
+    x
+}
+
 #[cfg(test)]
 mod tests {
-    use super::{bracketed, newton};
+    use super::{bracketed, newton, secant};
+
+    #[test]
+    fn secants_find_the_fixed_point_of_a_map() {
+        let found = secant(|x: f64| x.cos() - x, [0.0, 1.0], 1.0, 1e-14);
+        assert!((found - 0.739_085_133_215_160_6).abs() < 1e-13, "{found}");
+        // Flat above, all but a shift below.
+        let mut looks = 0;
+        let map = |x: f64| (x + 0.02).min(0.37);
+        let found = secant(|x| (looks += 1, map(x) - x).1, [0.0, 1.0], 1.0, 1e-14);
+        assert!((found - 0.37).abs() < 1e-13 && looks < 4, "{found} {looks}");
+    }
 
     #[test]
     fn newton_agrees_with_the_bracket() {

@@ -13,6 +13,7 @@
 //! Exact regimes: full contact where `w/2 <= F_n/k_n`; full slip (`mu' = 1`) where the slider never sticks,
 //! always so for `kappa >= 1`, which is `k_l U >= pi mu_0 k_n w f`.
 
+mod inverse;
 mod stretch;
 
 use crate::condition::{Condition, OutOfDomain};
@@ -20,6 +21,7 @@ use crate::finger::Finger;
 use crate::prediction::Regime;
 use crate::quantity::PeakToPeak;
 use crate::root;
+pub use inverse::amplitude_for;
 use std::f64::consts::PI;
 use stretch::Stretch;
 

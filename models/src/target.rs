@@ -15,9 +15,17 @@ pub struct Target {
     pub step_m: f64,
     /// Wanted `mu'`.
     pub mu_relative: Vec<f64>,
+    /// Time in s by which the target is read ahead of the position, at the speed of the pass: what loop,
+    /// amplifier and plate are known to take.
+    #[serde(default, skip_serializing_if = "is_zero")]
+    pub lead_s: f64,
     /// Gains of a feedback on the measured friction; none: open loop.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub feedback: Option<Feedback>,
+}
+
+fn is_zero(value: &f64) -> bool {
+    *value == 0.0
 }
 
 /// A proportional and integral correction of the wanted `mu'` by the measured one.
@@ -91,8 +99,13 @@ mod tests {
 
     #[test]
     fn it_is_read_linearly_and_ends_where_it_ends() {
-        let target =
-            Target { start_m: -1e-3, step_m: 1e-3, mu_relative: vec![0.2, 0.4, 1.0], feedback: None };
+        let target = Target {
+            start_m: -1e-3,
+            step_m: 1e-3,
+            mu_relative: vec![0.2, 0.4, 1.0],
+            lead_s: 0.0,
+            feedback: None,
+        };
         let near = |x: f64, mu: f64| assert!((target.at(x).expect("inside") - mu).abs() < 1e-12, "{x}");
         near(-1e-3, 0.2);
         near(-0.5e-3, 0.3);

@@ -60,6 +60,8 @@ class Verdict:
     remarks: tuple[str, ...]
     predictions: str | None
     """CSV of the conditions that were to be predicted."""
+    model: str | None
+    """The corrected model as the text of a TOML file, for ``run(model=...)``; `None` where no effect of the library explains most of the gap."""
     json: str = field(repr=False)
     words: str = field(repr=False)
     """What the command says on a terminal."""
@@ -127,7 +129,7 @@ def diagnose(
         predict = Path(predict).read_bytes() if isinstance(predict, (str, os.PathLike)) else csv_bytes(predict)
     law = None if model is None else base_law(model, name, data)
     rig = Path(rig)
-    text, words, page, predictions = _muprime.diagnose(
+    text, words, page, predictions, corrected = _muprime.diagnose(
         name, data, os.fspath(rig), rig.read_text(encoding="utf-8"), pairs, list(without), predict, damage, law, run,
         [os.fspath(effect) for effect in effects],
     )
@@ -152,6 +154,7 @@ def diagnose(
         shrinkage_ci95=_interval(told["gap"].get("shrinkage_ci95")),
         remarks=tuple(told["remarks"]),
         predictions=predictions,
+        model=corrected,
         json=text,
         words=words,
         page=page,

@@ -15,8 +15,9 @@ use std::sync::Arc;
 use tables::law::{for_finger, of_text};
 use tables::passes::parse_passes;
 
-/// A diagnosis: the document of `muprime diagnose --json`, text, page, and requested predictions as CSV.
-type Texts = (String, String, String, Option<String>);
+/// A diagnosis: the document of `muprime diagnose --json`, text, page, requested predictions as CSV, and the
+/// corrected model as TOML.
+type Texts = (String, String, String, Option<String>, Option<String>);
 
 /// A base law: its name or path, and its text where it is not a file.
 type Model = (String, Option<String>);
@@ -94,5 +95,6 @@ fn texts(
             .concat();
     let page = runs::report::diagnosis::page(&result, &table, &about)?;
     let predicted = conditions.as_ref().map(|conditions| predictions(&result, conditions));
-    Ok((document(&result, &rig, damage).into_diagnostic()?, words(&result, &rig), page, predicted))
+    let model = result.saved_model().map(|model| toml::to_string(&model)).transpose().into_diagnostic()?;
+    Ok((document(&result, &rig, damage).into_diagnostic()?, words(&result, &rig), page, predicted, model))
 }

@@ -7,7 +7,7 @@
 
 use crate::safety::{HARD, Limits};
 use models::condition::Condition;
-use models::inverse::{Reach, quick};
+use models::inverse::{QuickAnswer, Reach, quick};
 use models::prediction::FrictionModel;
 use models::quantity::PeakToPeak;
 use models::target::{Feedback, MOST_DELAY, Target};
@@ -35,7 +35,7 @@ pub struct Rendered {
 #[derive(Clone, Copy, Debug)]
 pub struct Render {
     largest: PeakToPeak,
-    last: PeakToPeak,
+    last: Option<QuickAnswer>,
     /// Integral part of the feedback, in `mu'`.
     integral: f64,
     /// The last wanted values, a ring, with the place of the next and how many there are.
@@ -54,7 +54,7 @@ impl Render {
     pub fn up_to(largest: PeakToPeak, before: Option<Render>) -> Self {
         let begun = Render {
             largest,
-            last: PeakToPeak::ZERO,
+            last: None,
             integral: 0.0,
             wanted: [0.0; MOST_DELAY + 1],
             next: 0,
@@ -91,9 +91,11 @@ impl Render {
         limits: &Limits,
     ) -> Option<Rendered> {
         let wanted = target.at(now.position_m)?;
+        let lead_m = now.direction.sign() * now.speed_m_s * target.lead_s;
+        let ahead = target.at(now.position_m + lead_m).unwrap_or(wanted);
         let measured = lateral_n.map(|l| now.direction.sign() * l / (now.normal_force_n * now.mu0));
         let cycle_s = limits.timing.cycle.seconds();
-        let due = target.feedback.and_then(|gains| self.due(wanted, &gains, cycle_s));
+        let due = target.feedback.and_then(|gains| self.due(ahead, &gains, cycle_s));
         let error = due.zip(measured).map_or(0.0, |(due, mu)| due - mu);
         let correction = target.feedback.map(|gains| {
             (self.integral + gains.proportional * error).clamp(-MOST_CORRECTION, MOST_CORRECTION)
@@ -101,7 +103,7 @@ impl Render {
         let largest =
             self.largest.metres().min(limits.amplitude_max.metres()).min(HARD.amplitude_max.metres());
         let largest = PeakToPeak::from_metres(largest);
-        let found = quick(law, now, wanted + correction.unwrap_or(0.0), largest, self.last)?;
+        let found = quick(law, now, ahead + correction.unwrap_or(0.0), largest, self.last.as_ref())?;
         if let Some(gains) = target.feedback {
             // Anti-windup: what cannot be had is not summed further in its direction.
             let stuck = match found.reach {
@@ -116,7 +118,7 @@ impl Render {
             }
         }
         if found.amplitude > PeakToPeak::ZERO {
-            self.last = found.amplitude;
+            self.last = Some(found);
         }
         Some(Rendered {
             wanted,

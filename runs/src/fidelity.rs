@@ -3,12 +3,15 @@
 //! of it is made from the record's rows.
 
 pub mod dynamics;
+mod lateness;
 mod spectra;
 
 use crate::plan::Point;
+use crate::plan::RenderPlan;
 use crate::run_dir::records_in;
 use crate::session::TARGET;
 use dynamics::{Dynamics, Part};
+pub use lateness::Late;
 use miette::{IntoDiagnostic, WrapErr};
 use models::target::Target;
 use realtime::cycle::{Command, Phase};
@@ -37,12 +40,15 @@ pub struct Stated {
     pub known: Vec<(f64, Dynamics)>,
     /// What the rig will not show of the target, in sentences.
     pub remarks: Vec<String>,
+    /// Period of a grating in m.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub period_m: Option<f64>,
 }
 
 impl Stated {
     /// Of the passes of a plan.
     pub fn of(
-        tolerance: f64,
+        render: &RenderPlan,
         points: &[Point],
         known: impl Fn(f64) -> Dynamics,
         remarks: Vec<String>,
@@ -50,7 +56,9 @@ impl Stated {
         let mut frequencies: Vec<f64> = points.iter().map(|p| p.condition.frequency_hz).collect();
         frequencies.sort_by(f64::total_cmp);
         frequencies.dedup();
-        Stated { tolerance, known: frequencies.into_iter().map(|f| (f, known(f))).collect(), remarks }
+        let known = frequencies.into_iter().map(|f| (f, known(f))).collect();
+        let grating = render.target == crate::plan::Kind::Grating;
+        Stated { tolerance: render.tolerance, known, remarks, period_m: render.period_m.filter(|_| grating) }
     }
 
     fn at(&self, frequency_hz: f64) -> Option<Dynamics> {
@@ -81,6 +89,9 @@ pub struct Group {
     pub normal_force_n: f64,
     /// Drive frequency in Hz.
     pub frequency_hz: f64,
+    /// Time in s by which the target was read ahead.
+    #[serde(default)]
+    pub lead_s: f64,
     /// Passes.
     pub passes: usize,
     /// Cycles that were compared.
@@ -105,6 +116,16 @@ pub struct Group {
     pub shift_sd_m: f64,
     /// Root-mean-square difference of `mu'` once that way is taken out.
     pub rms_shifted: f64,
+    /// The same with the known delay taken out; none where no dynamics are known.
+    #[serde(default)]
+    pub rms_known: Option<f64>,
+    /// The same with the mean way of the other passes taken out; none of a single pass.
+    #[serde(default)]
+    pub rms_held_out: Option<f64>,
+    /// How late loop and plate, and the sensor, come beside what is known; empty with a feedback, and where
+    /// the target does not show it.
+    #[serde(default)]
+    pub late: Vec<Late>,
     /// Transfer function from wanted to measured `mu'`, where the target has power.
     pub transfer: Vec<Bin>,
     /// Where the measured transfer function has fallen to -3 dB; none where the target does not reach as far.
@@ -166,12 +187,6 @@ pub struct Collector {
 
 /// Places of a profile.
 const PLACES: usize = 200;
-/// Steps of the search for a shift either side, and how far it goes: this time at the speed of the pass, or
-/// this way.
-const SHIFTS: i32 = 120;
-const SHIFT_S: f64 = 0.02;
-const SHIFT_M: f64 = 0.2e-3;
-
 impl Collector {
     /// Takes a row.
     pub fn row(&mut self, row: &Row) {
@@ -213,14 +228,14 @@ impl Collector {
     }
 
     /// What the rows come to.
-    pub fn finish(self, stated: &Stated, cycle_s: f64) -> Fidelity {
+    pub fn finish(self, target: &Target, stated: &Stated, cycle_s: f64) -> Fidelity {
         let mut keys: Vec<[f64; 3]> = self.passes.iter().map(|pass| pass.key).collect();
         keys.sort_by(|a, b| a.partial_cmp(b).expect("numbers"));
         keys.dedup();
         let of = |key: &[f64; 3]| {
             let passes: Vec<&Rendered> =
                 self.passes.iter().filter(|p| p.key == *key && p.samples.len() > 16).collect();
-            (!passes.is_empty()).then(|| group(*key, &passes, stated, cycle_s))
+            (!passes.is_empty()).then(|| group(*key, &passes, target, stated, cycle_s))
         };
         Fidelity {
             schema: SCHEMA.into(),
@@ -231,39 +246,46 @@ impl Collector {
     }
 }
 
-fn group([speed, load, hz]: [f64; 3], passes: &[&Rendered], stated: &Stated, cycle_s: f64) -> Group {
+fn group(
+    [speed, load, hz]: [f64; 3],
+    passes: &[&Rendered],
+    target: &Target,
+    stated: &Stated,
+    cycle_s: f64,
+) -> Group {
     let samples = || passes.iter().flat_map(|pass| &pass.samples);
     let n = samples().count() as f64;
     let rms = |of: fn(&Sample) -> f64| (samples().map(|s| of(s).powi(2)).sum::<f64>() / n).sqrt();
     let share = |of: &dyn Fn(&Sample) -> bool| samples().filter(|s| of(s)).count() as f64 / n;
-    let shifts: Vec<(bool, f64, f64)> =
-        passes.iter().map(|pass| (pass.forward, shift(pass))).map(|(f, (way, rms))| (f, way, rms)).collect();
+    let known = stated.at(hz);
+    let rendering = (target.lead_s, stated.period_m, target.feedback.is_none());
+    let late = lateness::of(passes, speed, known.as_ref(), rendering);
     let mean = |values: &[f64]| values.iter().sum::<f64>() / values.len().max(1) as f64;
-    let ways =
-        |forward: bool| -> Vec<f64> { shifts.iter().filter(|s| s.0 == forward).map(|s| s.1).collect() };
+    let ways = |forward: bool| -> Vec<f64> {
+        passes.iter().zip(&late.ways).filter(|(pass, _)| pass.forward == forward).map(|(_, w)| *w).collect()
+    };
     let [forward, backward] = [ways(true), ways(false)];
     let off = [&forward, &backward].map(|w| w.iter().map(|v| (v - mean(w)).powi(2)).sum::<f64>());
     let shift_of = |w: &[f64]| (!w.is_empty()).then(|| mean(w));
-    let late =
-        (mean(&shifts.iter().map(|s| s.1).collect::<Vec<_>>()) / (speed * cycle_s)).round().max(0.0) as usize;
+    let delay = (mean(&late.ways) / (speed * cycle_s)).round().max(0.0) as usize;
     let bins = |segments: usize| {
         let mut spectra = Spectra::for_passes(passes.iter().map(|p| p.samples.len()), segments, cycle_s);
         for pass in passes {
             let [wanted, measured]: [Vec<f64>; 2] = [|s: &Sample| s.wanted, |s: &Sample| s.measured]
                 .map(|of: fn(&Sample) -> f64| pass.samples.iter().map(of).collect());
-            spectra.add(&wanted, &measured, late);
+            spectra.add(&wanted, &measured, delay);
         }
         spectra.bins(speed)
     };
     let narrow = bins(spectra::SEGMENTS[0]);
     let transfer = if narrow.len() > spectra::BROAD { bins(spectra::SEGMENTS[1]) } else { narrow };
-    let known = stated.at(hz);
     let mut parts = known.map_or_else(Vec::new, |known| known.parts());
     parts.sort_by(|a, b| a.corner_hz.unwrap_or(f64::MAX).total_cmp(&b.corner_hz.unwrap_or(f64::MAX)));
     Group {
         speed_m_s: speed,
         normal_force_n: load,
         frequency_hz: hz,
+        lead_s: target.lead_s,
         passes: passes.len(),
         cycles: n as usize,
         saturated: share(&|s| !s.reached),
@@ -274,7 +296,10 @@ fn group([speed, load, hz]: [f64; 3], passes: &[&Rendered], stated: &Stated, cyc
         rms_law: rms(|s| s.measured - s.predicted),
         shift_m: [shift_of(&forward), shift_of(&backward)],
         shift_sd_m: (off.iter().sum::<f64>() / passes.len().saturating_sub(2).max(1) as f64).sqrt(),
-        rms_shifted: mean(&shifts.iter().map(|s| s.2 * s.2).collect::<Vec<_>>()).sqrt(),
+        rms_shifted: late.rms_shifted,
+        rms_known: late.rms_known,
+        rms_held_out: late.rms_held_out,
+        late: late.parts,
         minus_3_db: spectra::minus_3_db(&transfer),
         known_minus_3_db_hz: known.and_then(|known| known.minus_3_db_hz()),
         transfer,
@@ -282,38 +307,6 @@ fn group([speed, load, hz]: [f64; 3], passes: &[&Rendered], stated: &Stated, cyc
         parts,
         profiles: [true, false].map(|forward| profile(passes, forward)),
     }
-}
-
-/// The way by which the measured friction of a pass comes after the wanted one, and the root-mean-square
-/// difference then: the shift of best agreement, with a parabola through the three best steps.
-fn shift(pass: &Rendered) -> (f64, f64) {
-    let sign = if pass.forward { 1.0 } else { -1.0 };
-    let place = |s: &Sample| sign * s.x_m;
-    let most = (SHIFT_S * pass.key[0]).max(SHIFT_M);
-    let wanted: Vec<(f64, f64)> = pass.samples.iter().map(|s| (place(s), s.wanted)).collect();
-    let off = |way: f64| {
-        let mut sum = [0.0f64; 2];
-        for s in &pass.samples {
-            if let Some(w) = at(&wanted, place(s) - way) {
-                sum = [sum[0] + (s.measured - w).powi(2), sum[1] + 1.0];
-            }
-        }
-        sum[0] / sum[1].max(1.0)
-    };
-    let step = most / f64::from(SHIFTS);
-    let all: Vec<f64> = (-SHIFTS..=SHIFTS).map(|k| off(f64::from(k) * step)).collect();
-    let best = (1..all.len() - 1).min_by(|a, b| all[*a].total_cmp(&all[*b])).unwrap_or(SHIFTS as usize);
-    let [a, b, c] = [all[best - 1], all[best], all[best + 1]];
-    let bend = a - 2.0 * b + c;
-    let way = step * (best as f64 - f64::from(SHIFTS) + if bend > 0.0 { 0.5 * (a - c) / bend } else { 0.0 });
-    (way, off(way).sqrt())
-}
-
-/// A line of points with increasing places, read linearly.
-fn at(points: &[(f64, f64)], x: f64) -> Option<f64> {
-    let k = points.partition_point(|p| p.0 < x);
-    let (a, b) = (points.get(k.checked_sub(1)?)?, points.get(k)?);
-    Some(if b.0 > a.0 { a.1 + (b.1 - a.1) * (x - a.0) / (b.0 - a.0) } else { b.1 })
 }
 
 fn profile(passes: &[&Rendered], forward: bool) -> Vec<Place> {
@@ -366,7 +359,9 @@ pub fn of_run(folder: &Path) -> miette::Result<Option<Fidelity>> {
             }
         }
     }
-    Ok(target.map(|_| found.finish(&stated, cycle_s)).filter(|fidelity| !fidelity.groups.is_empty()))
+    Ok(target
+        .map(|target| found.finish(&target, &stated, cycle_s))
+        .filter(|fidelity| !fidelity.groups.is_empty()))
 }
 
 /// Makes the fidelity of a run again and writes it into the run's folder; `None` of a run that rendered

@@ -287,8 +287,9 @@ impl Job {
     pub fn stated(&self) -> miette::Result<Stated> {
         let points = self.plan.points(self.seed, &self.setup.config.limits, &self.resolution()?)?;
         let remarks = self.followed(&points)?.map(|(_, remarks)| remarks).unwrap_or_default();
-        let tolerance = self.plan.file.render.as_ref().map_or(0.0, |render| render.tolerance);
-        Ok(Stated::of(tolerance, &points, |hz| Dynamics::of(&self.setup, hz), remarks))
+        let known = |hz| Dynamics::of(&self.setup, hz);
+        let render = self.plan.file.render.as_ref();
+        Ok(render.map_or_else(Stated::default, |render| Stated::of(render, &points, known, remarks)))
     }
 
     /// What the setup's amplifier can set, by its profile.

@@ -20,6 +20,9 @@ pub struct AmplifierConfig {
     pub amplitude_max_m: f64,
     /// Lowest and highest frequency taken (Hz).
     pub frequency_range_hz: [f64; 2],
+    /// Time constant with which its amplitude control follows the set-point (s); 0: at once. 'Off' is at once
+    /// in any case.
+    pub response_s: f64,
     /// Heartbeat timeout of its watchdog (s).
     pub watchdog_s: f64,
     /// Relative noise of the amplitude read back (-).
@@ -45,6 +48,7 @@ impl Default for AmplifierConfig {
             frequency_step_hz: 1.0,
             amplitude_max_m: 8e-6,
             frequency_range_hz: [10_000.0, 100_000.0],
+            response_s: 0.0,
             watchdog_s: 0.05,
             readback_relative_sd: 1e-3,
             readback_sd_m: 1e-9,
@@ -110,6 +114,9 @@ pub struct Amplifier {
     fault: bool,
     supply_closed: bool,
     temperature_c: f64,
+    /// Drive that its amplitude control has reached (m), and when.
+    drive_m: f64,
+    stepped_at: Nanos,
 }
 
 impl Amplifier {
@@ -127,6 +134,8 @@ impl Amplifier {
             fault: false,
             supply_closed: true,
             temperature_c,
+            drive_m: 0.0,
+            stepped_at: Nanos(0),
         }
     }
 
@@ -192,7 +201,16 @@ impl Amplifier {
             self.fault = true;
             self.output_on = false;
         }
-        (if self.output_on { self.amplitude.metres() } else { 0.0 }, self.frequency_hz)
+        let dt = now.since(self.stepped_at).seconds();
+        self.stepped_at = now;
+        let wanted = self.amplitude.metres();
+        let missing = if self.config.response_s > 0.0 {
+            (wanted - self.drive_m) * (-dt / self.config.response_s).exp()
+        } else {
+            0.0
+        };
+        self.drive_m = if self.output_on { wanted - missing } else { 0.0 };
+        (self.drive_m, self.frequency_hz)
     }
 
     /// Its state, with an amplitude measured with the given standard normal error.
@@ -242,6 +260,20 @@ mod tests {
         amplifier.command(AmplifierInput { enable: false, ..on(3) }, Nanos(7_000_000));
         amplifier.command(on(4), Nanos(8_000_000));
         assert!(amplifier.step(Nanos(8_000_000), 22.0, 0.0).0 > 0.0);
+    }
+
+    /// A first-order control: 63 % after its time constant, and 'off' at once.
+    #[test]
+    fn a_slow_amplitude_control_follows_with_its_time_constant() {
+        let config = AmplifierConfig { response_s: 4e-3, watchdog_s: 1.0, ..Default::default() };
+        let mut amplifier = Amplifier::new(config, 22.0);
+        amplifier.step(Nanos(0), 22.0, 0.0);
+        amplifier.command(on(1), Nanos(0));
+        let reached = (1..=40).map(|k| amplifier.step(Nanos(k * 100_000), 22.0, 0.0).0).last().unwrap();
+        let expected = 1.235e-6 * (1.0 - (-1.0f64).exp());
+        assert!((reached / expected - 1.0).abs() < 1e-9, "{reached} {expected}");
+        amplifier.command(AmplifierInput { enable: false, ..on(2) }, Nanos(4_000_000));
+        assert_eq!(amplifier.step(Nanos(4_100_000), 22.0, 0.0).0, 0.0);
     }
 
     #[test]

@@ -309,6 +309,6 @@ kinds! {
     frictional_heating in_plane_motion lateral_gain lateral_offset_drift lateral_recovery
     lateral_resonance load_dependent_friction mains_modulation mode_shape moisture_drift multi_asperity
     normal_damping normal_offset plate_tilt rate_dependent_friction resonance_detuning ridge_anisotropy
-    ridge_inertia second_harmonic sensor_lag speed_error speed_ripple squeeze_film stage_stall
+    ridge_inertia second_harmonic sensor_lag slow_amplifier speed_error speed_ripple squeeze_film stage_stall
     stiffness_error subsurface_relaxation time_misalignment triboelectric_attraction
 }

@@ -107,6 +107,17 @@ fn the_package_says_what_the_command_says() {
     println!("{out}");
     assert!(notebooks.status.success() && out.ends_with("ok\n"), "{out}{err}");
 
+    // A rendered target beside scipy.
+    let rendering = python()
+        .arg(file("tests/python/rendering.py"))
+        .arg(folder.path())
+        .env("PYTHONPATH", &site)
+        .output()
+        .unwrap();
+    let (out, err) = texts(&rendering);
+    println!("{out}");
+    assert!(rendering.status.success() && out.ends_with("ok\n"), "{out}{err}");
+
     // bluesky's RunEngine, and scikit-learn's own checks.
     let ecosystem = python()
         .arg(file("tests/python/ecosystem.py"))

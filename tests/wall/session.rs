@@ -91,6 +91,30 @@ fn a_sweep_over_real_modbus_tcp_ends_with_table_record_and_report() {
     });
 }
 
+/// The virtual-time twin: `tests/render.rs`.
+#[test]
+fn a_grating_is_rendered_over_real_modbus_tcp() {
+    wall::in_wall_clock_time(|| {
+        let folder = tempfile::tempdir().unwrap();
+        let plan = folder.path().join("grating.toml");
+        let text = "name = \"grating\"\nreference_every = 2\n[pass]\nsettle_s = 0.2\nmeasure_m = \"16mm\"\n[base]\n\
+            amplitude_pp_m = \"5.5um\"\nfrequency_hz = \"27.5kHz\"\nspeed_m_s = \"10mm/s\"\nnormal_force_n = \"250mN\"\n[render]\n\
+            target = \"grating\"\nperiod_m = \"4mm\"\nmean = 0.6\ndepth = 0.15\n[[series]]\nspeed_m_s = [\"10mm/s\"]\n";
+        std::fs::write(&plan, text).unwrap();
+        let plan = plan.display().to_string();
+        let (out, output) = sweep_unless_the_machine_stalls(folder.path(), |out| unhurried(&plan, out));
+        let (_, stderr) = texts(&output);
+        assert_eq!(output.status.code(), Some(0), "{stderr}");
+        let summary = &documents(&output).pop().unwrap()["summary"];
+        assert_eq!((&summary["outcome"], &summary["passes"]), (&"complete".into(), &summary["planned"]));
+        let fidelity = runs::fidelity::read(&out).unwrap();
+        let [group] = &fidelity.groups[..] else { panic!("{fidelity:?}") };
+        println!("rms {:.4}, shifted {:.4}, late {:?}", group.rms, group.rms_shifted, group.late);
+        assert!(group.saturated == 0.0 && group.rms_shifted < 0.06, "{group:?}");
+        assert_eq!(runs::fidelity::of_run(&out).unwrap(), Some(fidelity), "the record alone gives the same");
+    });
+}
+
 #[test]
 fn a_killed_record_is_recovered_and_an_ordinary_reader_opens_it() {
     wall::in_wall_clock_time(|| {

@@ -44,6 +44,16 @@ impl QuickAnswer {
     pub fn amplitude_sd_m(&self, mu_relative_sd: f64) -> Option<f64> {
         (self.slope_per_m < 0.0).then(|| mu_relative_sd / -self.slope_per_m)
     }
+
+    /// The slope in the logarithms, -1 where none is known, and the amplitude in m at which the line through
+    /// this answer reaches `target`.
+    fn onwards(&self, target: f64) -> (f64, f64) {
+        let (w, mu) = (self.amplitude.metres(), self.mu_relative);
+        let slope = self.slope_per_m * w / ((1.0 - mu) * -(-mu).ln_1p());
+        let slope = if slope.is_finite() && slope < 0.0 { slope } else { -1.0 };
+        let to = w * ((target - log_log(mu)) / slope).exp();
+        (slope, if to.is_finite() { to } else { w })
+    }
 }
 
 /// Evaluations of the law for one answer at most.
@@ -111,7 +121,7 @@ impl Search {
 }
 
 /// The amplitude up to `largest` at which `law` gives `wanted` at a condition. `last` is the answer of the
-/// cycle before, where the search begins; zero for none. Where friction is not monotone in the amplitude
+/// cycle before, from which the search goes on. Where friction is not monotone in the amplitude
 /// the crossing near `last` is found.
 ///
 /// The result is `None` where the law has no answer at this condition, whatever the amplitude.
@@ -120,14 +130,13 @@ pub fn quick(
     condition: &Condition,
     wanted: f64,
     largest: PeakToPeak,
-    last: PeakToPeak,
+    last: Option<&QuickAnswer>,
 ) -> Option<QuickAnswer> {
     let largest = largest.metres();
     let at = |w: f64| {
         let condition = Condition { amplitude: PeakToPeak::from_metres(w), ..*condition };
         law.mu_relative(&condition).ok().filter(|mu| mu.is_finite())
     };
-    let mut evaluations = 0;
     let answer = |w: f64, mu_relative: f64, slope_per_m: f64, reach: Reach, evaluations: u32| {
         Some(QuickAnswer {
             amplitude: PeakToPeak::from_metres(w),
@@ -140,31 +149,39 @@ pub fn quick(
     if !(wanted.is_finite() && largest > 0.0) {
         return None;
     }
+    if let Some((w, slope)) = law.amplitude_for(condition, wanted) {
+        return if w.metres() <= largest {
+            answer(w.metres(), wanted, slope, Reach::Within, 0)
+        } else {
+            answer(largest, at(largest)?, 0.0, Reach::TooLow, 1)
+        };
+    }
+    let target = log_log(wanted);
+    let (slope, first) = last.map_or((-1.0, 0.0), |last| last.onwards(target));
+    let first = first.min(largest);
+    // d mu'/dw from a slope of the logarithms: d mu' = (1 - mu') (-ln(1 - mu')) slope dw / w.
+    let per_m = |w: f64, mu: f64, slope: f64| (1.0 - mu) * -(-mu).ln_1p() * slope / w;
+    // The line through the answer before may already lead to this one.
+    let ahead = if first > 0.0 { at(first) } else { None };
+    let mut evaluations = u32::from(first > 0.0);
+    if let Some(mu) = ahead.filter(|mu| (mu - wanted).abs() <= CLOSE && *mu < 1.0) {
+        return answer(first, mu, per_m(first, mu, slope), Reach::Within, 1);
+    }
     let still = at(0.0)?;
     if wanted >= still {
         let reach = if wanted > still + CLOSE { Reach::TooHigh } else { Reach::Within };
-        return answer(0.0, still, 0.0, reach, 1);
+        return answer(0.0, still, 0.0, reach, evaluations + 1);
     }
-    let first = last.metres().min(largest);
-    let starts = std::iter::once(first).filter(|w| *w > 0.0).chain(STARTS.map(|s| s * largest));
-    let mut begin = None;
-    for w in starts {
-        evaluations += 1;
-        begin = at(w).map(|mu| (w, mu));
+    let mut begin = ahead.map(|mu| (first, mu));
+    for w in STARTS.map(|share| share * largest) {
         if begin.is_some() {
             break;
         }
+        evaluations += 1;
+        begin = at(w).map(|mu| (w, mu));
     }
     let (mut w, mut mu) = begin?;
-    let mut search = Search {
-        wanted,
-        target: log_log(wanted),
-        low: (0.0, still),
-        high: None,
-        last: None,
-        slope: -1.0,
-        per_m: 0.0,
-    };
+    let mut search = Search { wanted, target, low: (0.0, still), high: None, last: None, slope, per_m: 0.0 };
     // Where the law has no answer: below one of two amplitudes, above the other.
     let mut beyond = false;
     while evaluations < MOST_EVALUATIONS && (mu - wanted).abs() > CLOSE {
@@ -190,11 +207,8 @@ pub fn quick(
             return answer(w, mu, search.per_m, Reach::BeyondLaw, evaluations);
         }
     }
-    let slope = match search.last {
-        // d mu'/dw from the slope of the logarithms: d mu' = (1 - mu') (-ln(1 - mu')) slope dw / w.
-        Some(_) if mu > 0.0 && mu < 1.0 && w > 0.0 => (1.0 - mu) * -(-mu).ln_1p() * search.slope / w,
-        _ => search.per_m,
-    };
+    let seen = (search.last.is_some() || last.is_some()) && mu > 0.0 && mu < 1.0 && w > 0.0;
+    let slope = if seen { per_m(w, mu, search.slope) } else { search.per_m };
     // At a jump of the law no amplitude gives what is wanted.
     let reach = if (mu - wanted).abs() > JUMP { Reach::BeyondLaw } else { Reach::Within };
     answer(w, mu, slope, reach, evaluations)
@@ -218,12 +232,12 @@ mod tests {
             Reading::ALL.into_iter().find(|r| r.psi_star().0 == PSI_STAR).expect("the paper's Psi*");
         let law = EmpiricalPsi::read(finger, reading).expect("a finger");
         let c = Condition::paper();
-        let mut last = PeakToPeak::ZERO;
+        let mut last = None;
         for k in 1..60 {
             let wanted = 0.15 + 0.8 * (f64::from(k) * 0.618).fract();
             let psi = -PSI_STAR * (1.0 - wanted).ln();
             let exact = c.speed_m_s / (c.frequency_hz * c.mu0 * (1.0 + finger.poisson_ratio) * psi);
-            let found = quick(&law, &c, wanted, LARGEST, last).expect("an answer");
+            let found = quick(&law, &c, wanted, LARGEST, last.as_ref()).expect("an answer");
             if exact > LARGEST.metres() {
                 assert_eq!(found.reach, Reach::TooLow, "{wanted}");
                 continue;
@@ -233,18 +247,17 @@ mod tests {
             // d mu'/dw = -(1 - mu') Psi / (Psi* w).
             let slope = -(1.0 - wanted) * psi / PSI_STAR / exact;
             assert!((found.slope_per_m / slope - 1.0).abs() < 1e-3, "{found:?} {slope}");
-            last = found.amplitude;
+            last = Some(found);
         }
     }
 
     #[test]
     fn saturation_is_said_both_ways() {
         let law = SpringSlider::new(Finger::paper()).expect("a finger");
-        let at =
-            |wanted| quick(&law, &Condition::paper(), wanted, LARGEST, PeakToPeak::ZERO).expect("an answer");
+        let at = |wanted| quick(&law, &Condition::paper(), wanted, LARGEST, None).expect("an answer");
         assert_eq!((at(0.01).reach, at(0.01).amplitude), (Reach::TooLow, LARGEST));
         assert_eq!((at(1.2).reach, at(1.2).amplitude), (Reach::TooHigh, PeakToPeak::ZERO));
         assert_eq!((at(1.0).reach, at(1.0).amplitude), (Reach::Within, PeakToPeak::ZERO));
-        assert!(quick(&law, &Condition::paper(), f64::NAN, LARGEST, PeakToPeak::ZERO).is_none());
+        assert!(quick(&law, &Condition::paper(), f64::NAN, LARGEST, None).is_none());
     }
 }

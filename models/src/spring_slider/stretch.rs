@@ -83,11 +83,20 @@ impl Stretch {
             x = turn.left_over;
             turn = self.turn(x);
         }
-        // The map from one touch-down to the next is monotone with slope at most one, so what is left grows
-        // towards the fixed point. Bisection finds it where iteration would take thousands of turns.
+        // The map from one touch-down to the next is monotone with slope at most one: flat where slip forgets
+        // what the turn began with, all but a shift below. Secants from above cross both in a few turns.
         let top = self.offset + 1.0;
-        let fixed = root::bracketed(|x| self.turn(x).left_over - x, x, top);
-        from(self.turn(fixed), fixed)
+        let ends = [x, top];
+        root::secant(
+            |at| {
+                (x, turn) = (at, self.turn(at));
+                turn.left_over - at
+            },
+            ends,
+            top,
+            1e-14 * (1.0 + top),
+        );
+        from(turn, x)
     }
 
     /// One turn that starts at touch-down with the stretch `x`.

@@ -15,6 +15,9 @@ use std::f64::consts::PI;
 pub struct Dynamics {
     /// Time constant of the plate's ring-up in s.
     pub ring_time_s: f64,
+    /// Time constant of the amplifier's amplitude control in s, where a virtual rig states one.
+    #[serde(default)]
+    pub amplifier_s: f64,
     /// Period of the loop in s.
     pub cycle_s: f64,
     /// -3 dB bandwidth of the lateral channel in Hz, where its profile states one.
@@ -52,6 +55,7 @@ impl Dynamics {
         let ring = world.as_ref().map(|world| world.plate.quality_factor / (PI * frequency_hz));
         Dynamics {
             ring_time_s: ring.unwrap_or(timing.ring_time.seconds()),
+            amplifier_s: world.as_ref().map_or(0.0, |world| world.amplifier.response_s),
             cycle_s: timing.cycle.seconds(),
             sensor_hz: world.as_ref().map(|world| world.sensor.bandwidth_hz).or(setup.lateral_passband_hz()),
             sensor_delay_s: world.as_ref().map_or(timing.lateral.latency.seconds(), |w| w.sensor.latency_s),
@@ -59,9 +63,10 @@ impl Dynamics {
         }
     }
 
-    /// What the plate leaves of a small sine of this frequency in Hz.
+    /// What plate and amplifier leave of a small sine of this frequency in Hz.
     pub fn plate(&self, hz: f64) -> f64 {
-        1.0 / (2.0 * PI * hz * self.ring_time_s).hypot(1.0)
+        let left = |seconds: f64| 1.0 / (2.0 * PI * hz * seconds).hypot(1.0);
+        left(self.ring_time_s) * left(self.amplifier_s)
     }
 
     /// The hold of the loop.
@@ -95,12 +100,16 @@ impl Dynamics {
     /// The parts, by name.
     pub fn parts(&self) -> Vec<Part> {
         let part = |name: &str, corner_hz, delay_s| Part { name: name.into(), corner_hz, delay_s };
-        let sensor = self.sensor_hz.map_or(0.0, |hz| std::f64::consts::SQRT_2 / (2.0 * PI * hz));
         vec![
-            part("plate", self.corner(|hz| self.plate(hz)), self.ring_time_s),
+            part("plate", self.corner(|hz| self.plate(hz)), self.ring_time_s + self.amplifier_s),
             part("loop", self.corner(|hz| self.hold(hz)), 1.5 * self.cycle_s),
-            part("sensor", self.corner(|hz| self.sensor(hz)), sensor + self.sensor_delay_s),
+            part("sensor", self.corner(|hz| self.sensor(hz)), self.sensor_part_s()),
         ]
+    }
+
+    /// Delay of the sensor at low frequency in s.
+    pub fn sensor_part_s(&self) -> f64 {
+        self.sensor_delay_s + self.sensor_hz.map_or(0.0, |hz| std::f64::consts::SQRT_2 / (2.0 * PI * hz))
     }
 
     /// Phase lag in rad of all parts at a frequency in Hz.
@@ -110,7 +119,10 @@ impl Dynamics {
             let x = hz / corner;
             (std::f64::consts::SQRT_2 * x).atan2(1.0 - x * x)
         });
-        (w * self.ring_time_s).atan() + w * (1.5 * self.cycle_s + self.sensor_delay_s) + sensor
+        (w * self.ring_time_s).atan()
+            + (w * self.amplifier_s).atan()
+            + w * (1.5 * self.cycle_s + self.sensor_delay_s)
+            + sensor
     }
 
     /// Gains of a feedback on the measured friction: its zero cancels the plate's ring-up, its integral
@@ -157,6 +169,7 @@ mod tests {
     fn the_corners_are_those_of_the_closed_forms() {
         let slow = Dynamics {
             ring_time_s: 5e-3,
+            amplifier_s: 0.0,
             cycle_s: 1e-5,
             sensor_hz: None,
             sensor_delay_s: 0.0,
@@ -176,6 +189,7 @@ mod tests {
     fn the_margins_are_those_of_an_integrator_with_a_delay() {
         let rig = Dynamics {
             ring_time_s: 2e-3,
+            amplifier_s: 0.0,
             cycle_s: 1e-4,
             sensor_hz: None,
             sensor_delay_s: 4e-3,

@@ -8,13 +8,14 @@ use crate::report::human::{number, quantity};
 use models::condition::Condition;
 use models::inverse::{Reach, quick};
 use models::prediction::FrictionModel;
-use models::quantity::PeakToPeak;
 use models::target::Target;
 use realtime::safety::Limits;
 use std::f64::consts::TAU;
 
 /// Cycles of the loop in one period of the target at least.
 const CYCLES_MIN: f64 = 4.0;
+/// Share of the setup's largest amplitude above which noise of the amplitude read back reaches the limit.
+const ROOM: f64 = 0.99;
 /// Share of a sine below which nothing is rendered.
 const LEAST_GAIN: f64 = 0.3;
 
@@ -74,6 +75,14 @@ impl Plan {
             );
         }
         wrong.end()?;
+        let limit = limits.amplitude_max;
+        if seen.iter().any(|c| c.amplitude.metres() > ROOM * limit.metres()) {
+            remarks.push(format!(
+                "rendering may use the largest amplitude of the setup, {}: noise of the amplitude read back can trip SR-07 there; a smaller \
+                 amplitude_pp_m leaves room",
+                quantity(limit.metres(), "m")
+            ));
+        }
         Ok(remarks)
     }
 
@@ -90,7 +99,7 @@ impl Plan {
         let place =
             place_of(&self.text, &["render", "depth"]).or_else(|| place_of(&self.text, &["render", "file"]));
         for wanted in demand.range {
-            let found = quick(law, c, wanted, c.amplitude, PeakToPeak::ZERO);
+            let found = quick(law, c, wanted, c.amplitude, None);
             let largest = quantity(c.amplitude.metres(), "m");
             let problem = match found.map(|f| (f.reach, f.mu_relative)) {
                 None => format!("the law '{}' has no answer at {speed}", law.name()),

@@ -1,14 +1,15 @@
 //! What a plan renders: a wanted friction over position, generated or from a file.
 
+mod file;
+
 use super::Plan;
 use crate::fidelity::dynamics::Dynamics;
-use crate::input::{BadInput, Problems, text_of};
+use crate::input::{BadInput, Problems};
 use models::target::{Feedback, MOST_DELAY, Target};
 use rand::{RngExt, SeedableRng};
 use rand_chacha::ChaCha12Rng;
 use serde::{Deserialize, Serialize};
 use std::f64::consts::TAU;
-use std::path::Path;
 
 /// `[render]`: every pass of the plan with an amplitude renders this target; the amplitude of its series is
 /// the largest used.
@@ -35,9 +36,19 @@ pub struct RenderPlan {
     /// Seed of the noise.
     #[serde(default)]
     pub seed: u64,
-    /// CSV file beside the plan, with the columns `x_m` and `mu_relative` or `lateral_force_n`.
+    /// File beside the plan: CSV with the columns `x_m` and `mu_relative` or `lateral_force_n` of a table, a
+    /// grey PNG of an image.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub file: Option<String>,
+    /// m, width of a pixel of an image.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub pixel_m: Option<f64>,
+    /// Row of an image, from 0 at the top; the middle one without it.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub row: Option<u32>,
+    /// s, time by which the target is read ahead, for what loop, amplifier and plate take.
+    #[serde(default)]
+    pub lead_s: f64,
     /// Difference of `mu'` that counts as rendered.
     #[serde(default = "tolerance")]
     pub tolerance: f64,
@@ -59,8 +70,11 @@ pub enum Kind {
     Ramp,
     /// A sum of sines with random phases.
     Noise,
-    /// A file.
+    /// A CSV file.
     Table,
+    /// A row of a grey image: black is `mean - depth`, white `mean + depth`; its middle lies in the middle of
+    /// the stroke.
+    Image,
 }
 
 /// Whether the measured force corrects what is rendered.
@@ -97,7 +111,7 @@ impl RenderPlan {
         match self.target {
             Kind::Grating => self.period_m,
             Kind::Noise => self.waves_m.map(|waves| waves[0]),
-            Kind::Ramp | Kind::Table => None,
+            Kind::Ramp | Kind::Table | Kind::Image => None,
         }
     }
 
@@ -128,14 +142,24 @@ impl RenderPlan {
         needs("waves_m", !noise || waves, "noise needs the shortest and the longest wave, 10 \u{b5}m to 1 m");
         let gain = self.integral_per_s.is_none_or(|k| k.is_finite() && k > 0.0);
         needs("integral_per_s", gain, "a number above 0 is needed");
-        needs("file", generated || self.file.is_some(), "a table needs the name of a CSV file");
+        let image = self.target == Kind::Image;
+        let filed = !image && self.target != Kind::Table;
+        needs(
+            "file",
+            filed || self.file.is_some(),
+            "a table needs the name of a CSV file, an image that of a PNG file",
+        );
+        let pixel = self.pixel_m.is_some_and(|m| m.is_finite() && (1e-7..=1e-2).contains(&m));
+        needs("pixel_m", !image || pixel, "an image needs the width of a pixel, 0.1 \u{b5}m to 10 mm");
+        needs("lead_s", (0.0..=0.5).contains(&self.lead_s), "a time from 0 to 0.5 s is needed");
     }
 
     /// The target over this span in m; `mu0` and load (N) turn a lateral force into `mu'`.
     fn made(&self, plan: &Plan, span: [f64; 2], mu0: f64) -> miette::Result<Target> {
         let length = span[1] - span[0];
         let waves: Vec<[f64; 3]> = match self.target {
-            Kind::Table => return self.read(plan, mu0),
+            Kind::Table => return self.table(plan, mu0),
+            Kind::Image => return self.image(plan, 0.5 * (span[0] + span[1])),
             Kind::Ramp => Vec::new(),
             Kind::Grating => vec![[TAU / self.period_m.unwrap_or(length), 1.0, 0.0]],
             Kind::Noise => {
@@ -164,76 +188,7 @@ impl RenderPlan {
             shape.iter_mut().for_each(|v| *v /= most);
         }
         let mu_relative = shape.into_iter().map(|v| self.mean + self.depth * v).collect();
-        Ok(Target { start_m: span[0], step_m, mu_relative, feedback: None })
-    }
-
-    /// A target from its file, on an even grid as fine as the file's smallest step.
-    fn read(&self, plan: &Plan, mu0: f64) -> miette::Result<Target> {
-        let name = self.file.as_deref().unwrap_or_default();
-        let path = Path::new(&plan.origin).parent().unwrap_or(Path::new("")).join(name);
-        let text = text_of(&path)?;
-        let shown = path.display().to_string();
-        let refuse = |problem: String, remedy: &str| -> miette::Report {
-            BadInput::new(&shown, &text, None, problem, remedy.to_string()).into()
-        };
-        let full_n = mu0 * plan.file.base.normal_force_n;
-        let mut lines = text.lines().enumerate().filter(|(_, l)| !l.trim().is_empty() && !l.starts_with('#'));
-        let head = lines.next().map_or("", |(_, l)| l.trim());
-        let scale = match head {
-            "x_m,mu_relative" => 1.0,
-            "x_m,lateral_force_n" => 1.0 / full_n,
-            _ => {
-                let problem = format!("{shown} begins with '{head}'");
-                return Err(refuse(problem, "a target's columns are x_m,mu_relative or x_m,lateral_force_n"));
-            }
-        };
-        let mut points: Vec<[f64; 2]> = Vec::new();
-        for (i, line) in lines {
-            let cells = line.split_once(',').map(|(x, v)| [x, v].map(|c| c.trim().parse::<f64>()));
-            let Some([Ok(x), Ok(v)]) = cells else {
-                return Err(refuse(
-                    format!("{shown}: line {}: '{line}' is not two numbers", i + 1),
-                    "write x_m,value",
-                ));
-            };
-            let mu = v * scale;
-            if !(mu > 0.0 && mu <= 1.0) || points.last().is_some_and(|p| x <= p[0]) {
-                let problem = format!("{shown}: line {}: mu' = {mu} at {x} m", i + 1);
-                return Err(refuse(
-                    problem,
-                    "mu' is above 0 and at most 1, and x_m increases from line to line",
-                ));
-            }
-            points.push([x, mu]);
-        }
-        let [Some(first), Some(last)] = [points.first(), points.last()] else {
-            return Err(refuse(
-                format!("{shown} has no values"),
-                "a target has at least two lines of values",
-            ));
-        };
-        let finest = points.windows(2).map(|p| p[1][0] - p[0][0]).fold(f64::INFINITY, f64::min);
-        let length = last[0] - first[0];
-        let count = (length / finest).ceil() + 1.0;
-        if !(2.0..=MOST).contains(&count) {
-            return Err(refuse(
-                format!("{shown}: {count} values on its finest step"),
-                "at most 200000, and at least two",
-            ));
-        }
-        let step_m = length / (count - 1.0);
-        let at = |i: usize| {
-            let x = (first[0] + step_m * i as f64).min(last[0]);
-            let k = points.partition_point(|p| p[0] < x).clamp(1, points.len() - 1);
-            let [a, b] = [points[k - 1], points[k]];
-            a[1] + (b[1] - a[1]) * (x - a[0]) / (b[0] - a[0])
-        };
-        Ok(Target {
-            start_m: first[0],
-            step_m,
-            mu_relative: (0..count as usize).map(at).collect(),
-            feedback: None,
-        })
+        Ok(Target { start_m: span[0], step_m, mu_relative, lead_s: self.lead_s, feedback: None })
     }
 }
 

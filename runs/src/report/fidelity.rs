@@ -3,7 +3,7 @@
 use super::html::{escape, list, note, table};
 use super::human::{number, quantity};
 use super::plots::fidelity::{key, over_position, transfer};
-use crate::fidelity::{Fidelity, Group};
+use crate::fidelity::{Fidelity, Group, Late};
 use std::fmt::Write;
 
 /// Groups whose profile is drawn.
@@ -36,6 +36,28 @@ fn shift(group: &Group) -> String {
     format!("{} / {}", mm(group.shift_m[0]), mm(group.shift_m[1]))
 }
 
+/// The parts that come later than known, in sentences.
+fn slower(group: &Group) -> Vec<String> {
+    let of = |late: &Late| {
+        let [delay, sd, known] = [late.delay_s, late.sd_s, late.known_s].map(|s| number(s * 1e3));
+        let (what, remedy) = match late.part.as_str() {
+            "sensor" => (
+                "the measured friction comes",
+                "the force sensor is slower than stated, or its times are shifted".to_string(),
+            ),
+            _ => (
+                "the amplitude comes",
+                format!(
+                    "amplifier or plate are slower than stated; lead_s = {:.4} in [render] reads the target ahead",
+                    late.delay_s + group.lead_s
+                ),
+            ),
+        };
+        format!("{what} {delay} \u{b1} {sd} ms late, {known} ms are known: {remedy}")
+    };
+    group.late.iter().filter(|late| late.slower).map(of).collect()
+}
+
 /// Lines for a terminal.
 pub fn lines(fidelity: &Fidelity) -> Vec<String> {
     let of = |group: &Group| {
@@ -43,7 +65,7 @@ pub fn lines(fidelity: &Fidelity) -> Vec<String> {
             0.0 => String::new(),
             share => format!("; {:.0} % of the way could not be had", 100.0 * share),
         };
-        [
+        let first = [
             format!(
                 "rendered at {}: mu' off by {:.3} rms ({:.0} % within {}), {:.3} without the shift of {} mm (forward / backward){saturated}",
                 quantity(group.speed_m_s, "m/s"),
@@ -54,7 +76,8 @@ pub fn lines(fidelity: &Fidelity) -> Vec<String> {
                 shift(group),
             ),
             format!("  {}", ends(group)),
-        ]
+        ];
+        first.into_iter().chain(slower(group).into_iter().map(|line| format!("  {line}"))).collect::<Vec<_>>()
     };
     fidelity.groups.iter().flat_map(of).chain(fidelity.remarks.iter().cloned()).collect()
 }
@@ -98,10 +121,13 @@ pub(super) fn section(fidelity: &Fidelity) -> miette::Result<String> {
             );
         }
     }
-    let remarks = match fidelity.remarks.is_empty() {
-        true => String::new(),
-        false => list(&fidelity.remarks, ""),
+    let at = |group: &Group| {
+        let speed = quantity(group.speed_m_s, "m/s");
+        slower(group).into_iter().map(move |line| format!("at {speed} {line}")).collect::<Vec<_>>()
     };
+    let remarks: Vec<String> =
+        fidelity.remarks.iter().cloned().chain(fidelity.groups.iter().flat_map(at)).collect();
+    let remarks = if remarks.is_empty() { String::new() } else { list(&remarks, "") };
     Ok(format!(
         "<h2>Rendered friction</h2>{}{remarks}<div class=\"panels\">{figures}</div>{}{}{}",
         table("Fidelity by speed", HEAD, &rows),

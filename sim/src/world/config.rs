@@ -124,6 +124,7 @@ impl WorldConfig {
         }
         let not_negative = [
             ("pass_relative_sd", self.pass_relative_sd),
+            ("amplifier.response_s", self.amplifier.response_s),
             ("finger.stiffness_relative_sd", self.finger.stiffness_relative_sd),
             ("finger.ridge_mass_kg", self.finger.ridge_mass_kg),
             ("finger.ridge_damping_ratio", self.finger.ridge_damping_ratio),

@@ -72,31 +72,13 @@ pub fn mean_friction(c: &Contact) -> f64 {
     // a few looks.
     let beyond = if lateral.drawn > 0.0 { c.speed * c.lateral_relaxation_time } else { 0.0 };
     let top = limits.iter().fold(0.0f64, |a, &b| a.max(b)) + c.speed * dt + beyond;
-    let (mut low, mut high) = ((0.0, f64::NAN), (top, f64::NAN));
-    let (mut x, mut last) = (top, None::<(f64, f64)>);
     let mut mean = 0.0;
-    for _ in 0..60 {
+    let change = |x: f64| {
         let (force, left) = lateral.cycle(limits, x);
         mean = force;
-        let gap = left - x;
-        if gap.abs() < SETTLED * top {
-            break;
-        }
-        if gap > 0.0 {
-            low = (x, gap)
-        } else {
-            high = (x, gap)
-        }
-        if high.0 - low.0 < SETTLED * top {
-            break;
-        }
-        let next = match last {
-            Some((x0, gap0)) if gap0 != gap => x - gap * (x - x0) / (gap - gap0),
-            _ => left,
-        };
-        last = Some((x, gap));
-        x = if next > low.0 && next < high.0 { next } else { 0.5 * (low.0 + high.0) };
-    }
+        left - x
+    };
+    models::root::secant(change, [0.0, top], top, SETTLED * top);
     mean * arc / (2.0 * PI)
 }
 

@@ -114,7 +114,13 @@ impl FrictionModel for Diverging {
 fn grating() -> Target {
     let step_m = 1e-4;
     let at = |k: i32| 0.28 + 0.05 * (std::f64::consts::PI * f64::from(k) * step_m / 1e-3).sin();
-    Target { start_m: -0.1, step_m, mu_relative: (-1000..=1000).map(at).collect(), feedback: None }
+    Target {
+        start_m: -0.1,
+        step_m,
+        mu_relative: (-1000..=1000).map(at).collect(),
+        lead_s: 0.0,
+        feedback: None,
+    }
 }
 
 fn time_of(cycle: u64) -> Nanos {

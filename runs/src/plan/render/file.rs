@@ -1,0 +1,131 @@
+//! A target from a file: a table, or a row of an image.
+
+use super::{MOST, RenderPlan};
+use crate::input::{BadInput, place_of, text_of};
+use crate::plan::Plan;
+use models::target::Target;
+use std::path::{Path, PathBuf};
+
+impl RenderPlan {
+    /// The file, beside the plan.
+    fn path(&self, plan: &Plan) -> PathBuf {
+        let name = self.file.as_deref().unwrap_or_default();
+        Path::new(&plan.origin).parent().unwrap_or(Path::new("")).join(name)
+    }
+
+    /// A target from its file, on an even grid as fine as the file's smallest step.
+    pub(super) fn table(&self, plan: &Plan, mu0: f64) -> miette::Result<Target> {
+        let path = self.path(plan);
+        let text = text_of(&path)?;
+        let shown = path.display().to_string();
+        let refuse = |problem: String, remedy: &str| -> miette::Report {
+            BadInput::new(&shown, &text, None, problem, remedy.to_string()).into()
+        };
+        let full_n = mu0 * plan.file.base.normal_force_n;
+        let mut lines = text.lines().enumerate().filter(|(_, l)| !l.trim().is_empty() && !l.starts_with('#'));
+        let head = lines.next().map_or("", |(_, l)| l.trim());
+        let scale = match head {
+            "x_m,mu_relative" => 1.0,
+            "x_m,lateral_force_n" => 1.0 / full_n,
+            _ => {
+                let problem = format!("{shown} begins with '{head}'");
+                return Err(refuse(problem, "a target's columns are x_m,mu_relative or x_m,lateral_force_n"));
+            }
+        };
+        let mut points: Vec<[f64; 2]> = Vec::new();
+        for (i, line) in lines {
+            let cells = line.split_once(',').map(|(x, v)| [x, v].map(|c| c.trim().parse::<f64>()));
+            let Some([Ok(x), Ok(v)]) = cells else {
+                return Err(refuse(
+                    format!("{shown}: line {}: '{line}' is not two numbers", i + 1),
+                    "write x_m,value",
+                ));
+            };
+            let mu = v * scale;
+            if !(mu > 0.0 && mu <= 1.0) || points.last().is_some_and(|p| x <= p[0]) {
+                let problem = format!("{shown}: line {}: mu' = {mu} at {x} m", i + 1);
+                return Err(refuse(
+                    problem,
+                    "mu' is above 0 and at most 1, and x_m increases from line to line",
+                ));
+            }
+            points.push([x, mu]);
+        }
+        let [Some(first), Some(last)] = [points.first(), points.last()] else {
+            return Err(refuse(
+                format!("{shown} has no values"),
+                "a target has at least two lines of values",
+            ));
+        };
+        let finest = points.windows(2).map(|p| p[1][0] - p[0][0]).fold(f64::INFINITY, f64::min);
+        let length = last[0] - first[0];
+        let count = (length / finest).ceil() + 1.0;
+        if !(2.0..=MOST).contains(&count) {
+            return Err(refuse(
+                format!("{shown}: {count} values on its finest step"),
+                "at most 200000, and at least two",
+            ));
+        }
+        let step_m = length / (count - 1.0);
+        let at = |i: usize| {
+            let x = (first[0] + step_m * i as f64).min(last[0]);
+            let k = points.partition_point(|p| p[0] < x).clamp(1, points.len() - 1);
+            let [a, b] = [points[k - 1], points[k]];
+            a[1] + (b[1] - a[1]) * (x - a[0]) / (b[0] - a[0])
+        };
+        Ok(Target {
+            start_m: first[0],
+            step_m,
+            mu_relative: (0..count as usize).map(at).collect(),
+            lead_s: self.lead_s,
+            feedback: None,
+        })
+    }
+
+    /// A target from a row of a grey PNG, whose middle lies at this position in m.
+    pub(super) fn image(&self, plan: &Plan, middle_m: f64) -> miette::Result<Target> {
+        let path = self.path(plan);
+        let refuse = |problem: String, remedy: &str| -> miette::Report {
+            let place = place_of(&plan.text, &["render", "file"]);
+            BadInput::new(
+                &plan.origin,
+                &plan.text,
+                place,
+                format!("{}: {problem}", path.display()),
+                remedy.to_string(),
+            )
+            .into()
+        };
+        let unread = |e: &dyn std::fmt::Display| refuse(e.to_string(), "give a PNG image");
+        let file = std::fs::File::open(&path).map_err(|e| unread(&e))?;
+        let mut decoder = png::Decoder::new(std::io::BufReader::new(file));
+        decoder.set_transformations(png::Transformations::EXPAND);
+        let mut reader = decoder.read_info().map_err(|e| unread(&e))?;
+        if reader.output_color_type().0 != png::ColorType::Grayscale {
+            return Err(refuse(
+                "the image is not grey".into(),
+                "save it as a grey image without transparency",
+            ));
+        }
+        let size = reader.output_buffer_size().ok_or_else(|| unread(&"the image is too large"))?;
+        let mut pixels = vec![0; size];
+        let frame = reader.next_frame(&mut pixels).map_err(|e| unread(&e))?;
+        let row = self.row.unwrap_or(frame.height / 2);
+        if row >= frame.height || frame.width < 2 || f64::from(frame.width) > MOST {
+            let problem = format!("row {row} of {} x {} pixels", frame.width, frame.height);
+            return Err(refuse(problem, "rows count from 0; a row has 2 to 200000 pixels"));
+        }
+        let line = &pixels[row as usize * frame.line_size..][..frame.line_size];
+        let grey: Vec<f64> = match frame.bit_depth {
+            png::BitDepth::Sixteen => line
+                .chunks_exact(2)
+                .map(|b| f64::from(u16::from_be_bytes([b[0], b[1]])) / f64::from(u16::MAX))
+                .collect(),
+            _ => line.iter().map(|v| f64::from(*v) / f64::from(u8::MAX)).collect(),
+        };
+        let step_m = self.pixel_m.unwrap_or_default();
+        let mu_relative = grey.iter().map(|v| self.mean + self.depth * (2.0 * v - 1.0)).collect();
+        let start_m = middle_m - 0.5 * step_m * (grey.len() - 1) as f64;
+        Ok(Target { start_m, step_m, mu_relative, lead_s: self.lead_s, feedback: None })
+    }
+}
