@@ -203,6 +203,16 @@ fn a_table_is_a_target_in_either_unit_and_a_row_of_an_image_is_one() {
         assert!((target.at(x).unwrap() - mu).abs() < 1e-9, "{x} {:?}", target.at(x));
     }
     assert_eq!(image(GREY, "").unwrap(), Some(target));
+    // `check` reads the file of a target without a setup.
+    let plan = folder.path().join("plan.toml");
+    let checked = |name: &str| {
+        let render =
+            format!("target = \"image\"\nfile = \"{name}\"\npixel_m = \"9mm\"\nmean = 0.5\ndepth = 0.25");
+        let text = format!("{HEAD}[render]\n{render}\n[[series]]\nspeed_m_s = [0.02]\n");
+        std::fs::write(&plan, text.replace("20mm\"\n[base]", "10mm\"\n[base]")).unwrap();
+        tests::muprime().arg("check").arg(&plan).output().unwrap().status.code()
+    };
+    assert_eq!((checked("image.png"), checked("none.png")), (Some(0), Some(2)));
     for (hex, text, expected) in
         [(COLOURED, "", "not grey"), (GREY, "row = 2", "row 2 of 3 x 2 pixels"), (&GREY[..60], "", "PNG")]
     {

@@ -184,6 +184,8 @@ fn judge(kind: &'static str, name: &str, on: &On, instead: Option<String>) -> mi
             let Some(setup) = &on.setup else {
                 let fine = Resolution { amplitude_pp_m: 0.0, frequency_hz: 0.0 };
                 plan.points(plan.file.seed, &widest(), &fine)?;
+                // The file of a target; how large a lateral force may be, the fingertip of a setup says.
+                plan.target(1e6, None)?;
                 return Ok(good);
             };
             complete(setup)?;

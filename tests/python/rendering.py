@@ -17,7 +17,8 @@ from scipy.signal import csd
 
 import muprime
 
-FOLDER = Path(sys.argv[1])
+FOLDER = Path(sys.argv[1]) / "rendering"
+FOLDER.mkdir()
 HEAD = """
 name = "peer"
 seed = 3
@@ -78,8 +79,7 @@ assert abs(np.sqrt(np.mean(both**2)) - group.rms) < 1e-9, (np.sqrt(np.mean(both*
 # The segments' length from the distance of the lines; the delay in whole cycles from the shift.
 hz = group.transfer["hz"]
 length = round(1 / (np.diff(hz).min() * period))
-ways = [way for way, n in zip(group.document["shift_m"], (1, 1), strict=True)]
-late = max(0, round(float(np.mean(ways)) / (group.speed_m_s * period)))
+late = max(0, round(float(np.mean(group.document["shift_m"])) / (group.speed_m_s * period)))
 sums = np.zeros((3, length // 2 + 1), complex)
 for wanted, measured in series:
     x, y = wanted[: len(wanted) - late], measured[late:]
@@ -98,17 +98,15 @@ print(f"transfer function and coherence of {len(hz)} lines, segments of {length}
 corner = group.document["minus_3_db"]["hz"]
 used = hz <= 1.6 * corner
 sd = 2 * np.maximum(group.transfer["gain_sd"] / group.transfer["gain"], 1e-4) * group.transfer["gain"] ** -2.0
-low_pass = lambda f, a, b, c: a * (1 + b * f**2 + c * f**4)
-guess = (1, corner**-2, 0)
-(a, b, c), _ = curve_fit(low_pass, hz[used], group.transfer["gain"][used] ** -2.0, p0=guess, sigma=sd[used], x_scale=(1, corner**-2, corner**-4))
+low_pass = lambda f, a, b, c: a * (1 + b * (f / corner) ** 2 + c * (f / corner) ** 4)
+(a, b, c), _ = curve_fit(low_pass, hz[used], group.transfer["gain"][used] ** -2.0, p0=(1, 1, 0), sigma=sd[used])
 own = brentq(lambda f: low_pass(f, 1, b, c) - 2, 1, 500)
 assert abs(own / corner - 1) < 0.02, (own, corner)
 print(f"-3 dB at {corner:.2f} Hz, scipy {own:.2f} Hz")
 
-# The inverse: scipy turns the spring-slider round at each condition that the loop saw.
+# The inverse: scipy turns the spring-slider round at the conditions of the loop, whose load is a mean over its window and not that of one cycle.
 _, rows, mu0, _ = rendered("grating", 'target = "grating"\nperiod_m = "2mm"\n')
-run = json.loads((FOLDER / "grating/run.json").read_text()) if (FOLDER / "grating/run.json").exists() else {}
-worst = 0.0
+ratios = []
 for row in rows[:: max(1, len(rows) // 300)]:
     seen = row["inputs"]["seen"]
     condition = dict(
@@ -118,10 +116,10 @@ for row in rows[:: max(1, len(rows) // 300)]:
         mu0=row["mu0"],
     )
     given = row["rendered"]
+    assert given["reach"] == "within", given
     law = lambda w: float(muprime.spring_slider(w, **condition).mu_relative)
-    if given["reach"] == "within":
-        worst = max(worst, abs(law(given["amplitude"]) - given["wanted"]))
-        sought = brentq(lambda w: law(w) - given["wanted"], 1e-9, 8e-6, xtol=1e-15)
-        assert abs(sought / given["amplitude"] - 1) < 1e-4, (sought, given, condition)
-print(f"inverse: mu' of the amplitude that was given is off by {worst:.1e} at most")
+    ratios.append(given["amplitude"] / brentq(lambda w: law(w) - given["wanted"], 1e-9, 8e-6, xtol=1e-15))
+off = np.abs(np.array(ratios) - 1)
+assert abs(np.median(ratios) - 1) < 2e-3 and off.max() < 0.03, (np.median(ratios), off.max())
+print(f"inverse: {len(ratios)} amplitudes over scipy's: median {np.median(ratios):.5f}, off by {off.max():.4f} at most")
 print("ok")

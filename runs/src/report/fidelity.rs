@@ -28,6 +28,9 @@ fn ends(group: &Group) -> String {
     if !parts.is_empty() {
         let _ = write!(text, " (each alone: {})", parts.join(", "));
     }
+    if group.lead_s > 0.0 {
+        let _ = write!(text, "; the target is read {} ahead", quantity(group.lead_s, "s"));
+    }
     text
 }
 
@@ -39,7 +42,9 @@ fn shift(group: &Group) -> String {
 /// The parts that come later than known, in sentences.
 fn slower(group: &Group) -> Vec<String> {
     let of = |late: &Late| {
-        let [delay, sd, known] = [late.delay_s, late.sd_s, late.known_s].map(|s| number(s * 1e3));
+        // The scatter of a rendered run may be some microseconds: 10 are what anyone reads.
+        let [delay, sd, known] =
+            [late.delay_s, late.sd_s.max(1e-5), late.known_s].map(|s| format!("{:.2}", s * 1e3));
         let (what, remedy) = match late.part.as_str() {
             "sensor" => (
                 "the measured friction comes",
