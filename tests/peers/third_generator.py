@@ -579,15 +579,15 @@ def deviations(rig, lateral, normal):
 
 
 def gap_of(d, act, values, rig):
-    """Noise-free forces, chi2 of the gap in the training rows, its rms on the hidden rows, and the floor."""
+    """Noise-free forces, chi2 of the gap in the training rows, its rms on the hidden rows, the floor, and what is left there."""
     lateral, normal = evaluate(d, act, values, rig["mu0"], rig["kn_true"], rig["kl_true"])
     train, hidden = rows(d, ~d.hidden), rows(d, d.hidden)
     sd = deviations(rig, lateral, normal)
     model, _ = recalibrated(train, lateral[~d.hidden], normal[~d.hidden], rig, sd[~d.hidden])
     chi2 = (((lateral[~d.hidden] - model(train, normal[~d.hidden])) / sd[~d.hidden]) ** 2).sum()
     full = rig["mu0"] * normal[d.hidden]
-    gap = np.sqrt((((lateral[d.hidden] - model(hidden, normal[d.hidden])) / full) ** 2).mean())
-    return lateral, normal, chi2, gap, np.sqrt(((sd[d.hidden] / full) ** 2).mean())
+    left = (lateral[d.hidden] - model(hidden, normal[d.hidden])) / full
+    return lateral, normal, chi2, np.sqrt((left**2).mean()), np.sqrt(((sd[d.hidden] / full) ** 2).mean()), left
 
 
 def with_size(rng, form, d, rig):
@@ -645,7 +645,7 @@ def make(folder, stratum, index, seed, measured=True):
     rig["kl"] = rig["kn"] * rng.uniform(0.25, 0.6)
     rig["kn_true"], rig["kl_true"] = (rig[k] * np.exp(rig["sd"] * rng.standard_normal()) for k in ("kn", "kl"))
     values = [with_size(rng, f, d, rig) for f in forms]
-    lateral, normal, chi2, gap, floor = gap_of(d, both(forms, values), (), rig)
+    lateral, normal, chi2, gap, floor, left = gap_of(d, both(forms, values), (), rig)
     distances = []
     if measured and stratum in ("single", "pair"):
         from third_library import distance  # the library's laws, which nothing else here reads
@@ -654,7 +654,8 @@ def make(folder, stratum, index, seed, measured=True):
     noisy = lateral * (1 + rig["r"] * scatter(rng, kind, d)) + rig["q"] * rng.standard_normal(len(normal))
     write(folder, d, rig, load, noisy)
     hidden = [{"point": int(i), "lateral_force_n": round(float(lateral[i]), 8), "mu0_f_n": round(float(rig["mu0"] * normal[i]), 8),
-               "in_hidden_region": bool(d.region[i])} for i in np.flatnonzero(d.hidden)]
+               "in_hidden_region": bool(d.region[i]), "recalibrated_error": round(float(e), 7)}
+              for i, e in zip(np.flatnonzero(d.hidden), left)]
     truth = {
         "cause": ["outside the library"] if stratum == "stranger" else sorted(f.name for f in forms),
         "detectable": bool(chi2 >= 30 and gap > floor), "chi2_over_recalibrated": round(float(chi2), 1), "gap": round(float(gap), 5),
@@ -686,6 +687,11 @@ def write(folder, d, rig, load, noisy):
         f"[noise]\npass_relative_sd = {rig['r']:.5f}\nforce_sd_n = {rig['q']:.6f}\n")
 
 
+def mixed(count):
+    """The numbers of all sets, mixed, so that the first few are a fair sample."""
+    return np.random.default_rng(3).permutation(count)
+
+
 def main():
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
     parser.add_argument("out", type=pathlib.Path)
@@ -694,13 +700,11 @@ def main():
         parser.add_argument(f"--{name}", type=int, default=count)
     parser.add_argument("--without-distances", action="store_true", help="leave them out: they take most of the time")
     a = parser.parse_args()
-    number = 0
-    for stratum, count in (("single", a.singles), ("pair", a.pairs), ("none", a.none), ("stranger", a.strangers)):
-        for index in range(count):
-            truth = make(a.out / f"set-{number:03}", stratum, index, a.seed, not a.without_distances)
-            print(f"set-{number:03}", *(truth[k] for k in ("cause", "form", "noise", "design", "passes", "detectable",
-                                                           "chi2_over_recalibrated", "gap", "floor", "distance")), flush=True)
-            number += 1
+    sets = [(s, i) for s, count in zip(STRATA, (a.singles, a.pairs, a.none, a.strangers)) for i in range(count)]
+    for number in mixed(len(sets)):
+        truth = make(a.out / f"set-{number:03}", *sets[number], a.seed, not a.without_distances)
+        print(f"set-{number:03}", *(truth[k] for k in ("cause", "form", "noise", "design", "passes", "detectable",
+                                                       "chi2_over_recalibrated", "gap", "floor", "distance")), flush=True)
 
 
 if __name__ == "__main__":
