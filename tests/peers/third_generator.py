@@ -4,10 +4,14 @@
 usage: third_generator.py OUT --seed S [--singles 110] [--pairs 30] [--none 20] [--strangers 40] [--without-distances]
 
 It shares no code with muprime, and no cause has a form of the library or of the project's own sealed sets. Each set is a
-folder: train.csv, rig.toml, conditions.csv (hidden passes without lateral force) and truth.json, which only a scorer reads:
-`cause`, `form`, `stranger` (structure and covariate), `noise`, `design`, `detectable` (the noise-free gap over a recalibrated
-baseline has a chi2 of 30 in train.csv, and its rms on the hidden passes exceeds the floor), `gap`, `floor`, `distance`, `alone` (the chi2 of each
-member by itself) and `hidden`. A distance is what the library's nearest law of the cause's name leaves of the noise-free gap (third_library.py).
+folder: train.csv, rig.toml, conditions.csv (hidden passes without lateral force) and truth.json, which only a scorer
+reads. Its keys:
+  cause, form; stranger: its structure and covariate; noise; design
+  detectable: the noise-free gap over a recalibrated baseline has a chi2 of 30 in train.csv, and its rms on the hidden
+    passes exceeds the floor, which is the stated repeatability there
+  gap, floor, alone: that rms, the floor, and the chi2 of each member of a pair by itself
+  distance: what the library's nearest law of the cause's name leaves of the noise-free gap (third_library.py)
+  hidden: noise-free lateral force, full friction and the recalibrated baseline's error of each hidden pass
 
 The contact is marched over the cycle: the plate presses the finger's spring, sliding stretches a lateral spring, and
 friction limits its force. All quantities are in SI units; w is peak to peak.
@@ -30,7 +34,8 @@ COLUMNS = ("w", "f", "U", "F", "dir", "x", "t", "run", "trun", "p", "T", "RH", "
 def contact(d, mu, kn, kl):
     """What each pass presents to the contact, before any cause."""
     one = np.ones(len(d.w))
-    return SimpleNamespace(w=d.w.copy(), f=d.f.copy(), U=d.U.copy(), F=d.F.copy(), mu=mu * one, kn=kn * one, kl=kl * one,
+    return SimpleNamespace(w=d.w.copy(), f=d.f.copy(), U=d.U.copy(), F=d.F.copy(), mu=mu * one, kn=kn * one, kl=kl
+                           * one,
                            heights=None, press=None, limit=None, march=None, mean=None, factor=1.0, read=[])
 
 
@@ -173,7 +178,8 @@ def cause(name, low, high, needs="", signed=False, **shapes):
 def stranger(name, structure, covariate, low, high, needs="", signed=True, **shapes):
     """Registers a structure that no cause of the library makes."""
     def add(act):
-        STRANGERS[name] = SimpleNamespace(name=name, act=act, low=low, high=high, needs=needs, signed=signed, shapes=shapes,
+        STRANGERS[name] = SimpleNamespace(name=name, act=act, low=low, high=high, needs=needs, signed=signed,
+                                          shapes=shapes,
                                           form=name, structure=structure, covariate=covariate)
         return act
     return add
@@ -369,7 +375,8 @@ def bends_with_the_load(c, d, s, power):
 
 @cause("lateral_offset_drift", 1e-3, 0.1, needs="runs", signed=True, power=(0.5, 1.5))
 def zeroed_in_part_before_each_run(c, d, s, power):
-    c.read.append(lambda lateral, normal: (lateral + s * (0.8 * (d.t / d.duration) ** power + 0.2 * d.trun / d.run_length), normal))
+    c.read.append(lambda lateral, normal: (lateral + s * (0.8 * (d.t / d.duration) ** power + 0.2 * d.trun
+                                                          / d.run_length), normal))
 
 
 @cause("lateral_offset_drift", 1e-3, 0.1, signed=True, waves=(0.3, 0.8), phase=(0.0, 6.28))
@@ -418,23 +425,27 @@ def _(c, d, s, place):
     c.read.append(lambda lateral, normal: (lateral + s * (d.T > np.quantile(d.T, place)), normal))
 
 
-@stranger("bump over humidity", "bump", "relative_humidity_pct", 0.03, 1.2, needs="weather", place=(0.3, 0.7), width=(2.0, 4.0))
+@stranger("bump over humidity", "bump", "relative_humidity_pct", 0.03, 1.2, needs="weather", place=(0.3, 0.7),
+          width=(2.0, 4.0))
 def _(c, d, s, place, width):
     c.mu = c.mu * np.exp(s * np.exp(-0.5 * ((d.RH - np.quantile(d.RH, place)) / width) ** 2))
 
 
-@stranger("bump over position", "bump", "position_m", 0.03, 1.2, needs="positions", place=(-0.01, 0.01), width=(0.002, 0.004))
+@stranger("bump over position", "bump", "position_m", 0.03, 1.2, needs="positions", place=(-0.01, 0.01),
+          width=(0.002, 0.004))
 def _(c, d, s, place, width):
     c.mu = c.mu * np.exp(s * np.exp(-0.5 * ((d.x - place) / width) ** 2))
 
 
-@stranger("resonance over frequency", "bump", "frequency_hz", 0.03, 1.2, needs="filling frequencies", place=(0.35, 0.65), q=(20, 40))
+@stranger("resonance over frequency", "bump", "frequency_hz", 0.03, 1.2, needs="filling frequencies",
+          place=(0.35, 0.65), q=(20, 40))
 def _(c, d, s, place, q):
     off = q * (d.f / (d.f.min() + place * np.ptp(d.f)) - 1)
     c.mu = c.mu * np.exp(s / (1 + off**2) * (d.w > 0))
 
 
-@stranger("period over position", "period", "position_m", 0.02, 0.6, needs="positions", period=(0.003, 0.009), phase=(0.0, 6.28))
+@stranger("period over position", "period", "position_m", 0.02, 0.6, needs="positions", period=(0.003, 0.009),
+          phase=(0.0, 6.28))
 def _(c, d, s, period, phase):
     c.mu = c.mu * (1 + s * np.sin(2 * np.pi * d.x / period + phase))
 
@@ -449,7 +460,8 @@ def _(c, d, s):
     c.mu = c.mu * (d.last / d.F_ref) ** s
 
 
-@stranger("rough over load", "rough", "normal_force_n", 0.02, 0.5, needs="filling", a=(5.0, 8.0), b=(9.0, 13.0), phase=(0.0, 6.28))
+@stranger("rough over load", "rough", "normal_force_n", 0.02, 0.5, needs="filling", a=(5.0, 8.0), b=(9.0, 13.0),
+          phase=(0.0, 6.28))
 def _(c, d, s, a, b, phase):
     c.mu = c.mu * np.exp(s * 0.7 * (np.sin(a * np.log(c.F) + phase) + np.sin(b * np.log(c.F) + 2 * phase)))
 
@@ -495,13 +507,15 @@ def drawn(rng, needs):
     starts = np.array([d.t[d.run == k].min() for k in range(1, runs + 1)])
     d.trun = d.t - starts[d.run - 1]
     d.run_length = d.trun.max() + d.step
-    d.x = rng.uniform(-0.018, 0.018, n) if rng.random() < 0.6 else 0.006 * rng.integers(-3, 4, n) + 4e-4 * rng.standard_normal(n)
+    d.x = rng.uniform(-0.018, 0.018, n) if rng.random() < 0.6 else 0.006 * rng.integers(-3, 4,
+                                                            n) + 4e-4 * rng.standard_normal(n)
     weather = "weather" in needs or rng.random() < 0.3
     d.T = 22 + (4 * (rng.permutation(n) / n - 0.5) if weather else 0.03 * rng.standard_normal(n))
     d.RH = 45 + (20 * (rng.permutation(n) / n - 0.5) if weather else 0.2 * rng.standard_normal(n))
     d.p = np.where(rng.random(n) < 0.3, 20e3, 101325.0) if rng.random() < 0.2 else np.full(n, 101325.0)
     d.last = np.concatenate([d.F[:1], d.F[:-1]])
-    d.columns = {"position_m": "positions" in needs or rng.random() < 0.6, "ambient_pressure_pa": np.ptp(d.p) > 0 or rng.random() < 0.5,
+    d.columns = {"position_m": "positions" in needs or rng.random() < 0.6,
+                 "ambient_pressure_pa": np.ptp(d.p) > 0 or rng.random() < 0.5,
                  "temperature_c": weather or rng.random() < 0.3, "relative_humidity_pct": weather or rng.random() < 0.3,
                  "run": runs > 1}
     d.runs = runs
@@ -555,7 +569,8 @@ STRATA = ("single", "pair", "none", "stranger")
 def recalibrated(d, force, normal, rig, sd):
     """Stiffnesses and mu0 refitted to noise-free forces under their priors; returns the force on any passes."""
     still = d.w == 0
-    start = (d.dir * force * normal)[still].sum() / (normal[still] ** 2).sum() if still.any() else (np.abs(force) / normal).max()
+    start = (d.dir * force * normal)[still].sum() / (normal[still] ** 2).sum() if still.any() else (np.abs(force)
+                                                            / normal).max()
     widths = np.array([0.3, rig["sd"], rig["sd"]])
     nominal = np.array([start, rig["kn"], rig["kl"]])
 
@@ -567,7 +582,8 @@ def recalibrated(d, force, normal, rig, sd):
     u = np.zeros(3)
     for _ in range(6):
         base = model(d, normal, u)
-        slopes = np.stack([(model(d, normal, u + s * e) - base) / s for s, e in zip(0.01 / widths, np.eye(3))], 1) / sd[:, None]
+        slopes = np.stack([(model(d, normal, u + s * e) - base) / s for s, e in zip(0.01 / widths, np.eye(3))],
+                          1) / sd[:, None]
         u = u + np.linalg.solve(slopes.T @ slopes + np.eye(3), slopes.T @ ((force - base) / sd) - u)
         u = np.clip(u, -12, 12)
     return (lambda e, load: model(e, load, u)), nominal * np.exp(widths * u)
@@ -579,7 +595,7 @@ def deviations(rig, lateral, normal):
 
 
 def gap_of(d, act, values, rig):
-    """Noise-free forces, chi2 of the gap in the training rows, its rms on the hidden rows, the floor, and what is left there."""
+    """Noise-free forces, chi2 of the training gap, rms of the hidden one, the floor, and what is left on hidden rows."""
     lateral, normal = evaluate(d, act, values, rig["mu0"], rig["kn_true"], rig["kl_true"])
     train, hidden = rows(d, ~d.hidden), rows(d, d.hidden)
     sd = deviations(rig, lateral, normal)
@@ -614,7 +630,8 @@ def both(members, values):
 
 
 # Of a pair at most one member may replace each part of the contact.
-SLOTS = {"squeeze_film": "F", "lateral_recovery": "march", "ridge_inertia": "all", "normal_damping": "press", "contact_ageing": "limit",
+SLOTS = {"squeeze_film": "F", "lateral_recovery": "march", "ridge_inertia": "all", "normal_damping": "press",
+         "contact_ageing": "limit",
          "adhesion": "press limit", "multi_asperity": "press", "load_dependent_friction": "limit"}
 
 
@@ -653,16 +670,21 @@ def make(folder, stratum, index, seed, measured=True):
     load = normal + rig["q"] * rng.standard_normal(len(normal))
     noisy = lateral * (1 + rig["r"] * scatter(rng, kind, d)) + rig["q"] * rng.standard_normal(len(normal))
     write(folder, d, rig, load, noisy)
-    hidden = [{"point": int(i), "lateral_force_n": round(float(lateral[i]), 8), "mu0_f_n": round(float(rig["mu0"] * normal[i]), 8),
+    hidden = [{"point": int(i), "lateral_force_n": round(float(lateral[i]), 8),
+               "mu0_f_n": round(float(rig["mu0"] * normal[i]), 8),
                "in_hidden_region": bool(d.region[i]), "recalibrated_error": round(float(e), 7)}
               for i, e in zip(np.flatnonzero(d.hidden), left)]
     truth = {
         "cause": ["outside the library"] if stratum == "stranger" else sorted(f.name for f in forms),
-        "detectable": bool(chi2 >= 30 and gap > floor), "chi2_over_recalibrated": round(float(chi2), 1), "gap": round(float(gap), 5),
+        "detectable": bool(chi2 >= 30 and gap > floor), "chi2_over_recalibrated": round(float(chi2),
+                                                            1), "gap": round(float(gap), 5),
         "floor": round(float(floor), 5), "stratum": stratum,
-        "alone": [round(float(gap_of(d, f.act, v, rig)[2]), 1) for f, v in zip(forms, values)], "form": [f.form for f in forms], "values": [[float(x) for x in v] for v in values],
+        "alone": [round(float(gap_of(d, f.act, v, rig)[2]), 1) for f, v in zip(forms, values)], "form": [f.form
+                                                            for f in forms], "values": [[float(x) for x in v]
+                                                            for v in values],
         "distance": [round(x, 4) for x in distances], "noise": kind, "design": d.kind, "passes": int((~d.hidden).sum()),
-        "stranger": {"structure": forms[0].structure, "covariate": forms[0].covariate} if stratum == "stranger" else None, "hidden": hidden}
+        "stranger": {"structure": forms[0].structure,
+                     "covariate": forms[0].covariate} if stratum == "stranger" else None, "hidden": hidden}
     (folder / "truth.json").write_text(json.dumps(truth))
     return truth
 
@@ -671,13 +693,15 @@ def write(folder, d, rig, load, noisy):
     """train.csv, conditions.csv and rig.toml."""
     folder.mkdir(parents=True, exist_ok=True)
     extra = [(name, values, digits) for name, values, digits in (
-        ("position_m", d.x, 5), ("ambient_pressure_pa", d.p, 0), ("temperature_c", d.T, 3), ("relative_humidity_pct", d.RH, 2),
+        ("position_m", d.x, 5), ("ambient_pressure_pa", d.p, 0), ("temperature_c", d.T, 3), ("relative_humidity_pct",
+                                                            d.RH, 2),
         ("run", d.run, 0)) if d.columns[name]]
     head = ["point", "time_s", "amplitude_pp_m", "frequency_hz", "speed_m_s", "direction", "normal_force_n"]
     for name, keep, lateral in (("train.csv", ~d.hidden, True), ("conditions.csv", d.hidden, False)):
         lines = [",".join(head + ["lateral_force_n"] * lateral + [e[0] for e in extra])]
         for i in np.flatnonzero(keep):
-            line = [f"{i}", f"{d.t[i]:.3f}", f"{d.w[i]:.6e}", f"{d.f[i]:.1f}", f"{d.U[i]:.6e}", f"{d.dir[i]:.0f}", f"{load[i]:.6f}"]
+            line = [f"{i}", f"{d.t[i]:.3f}", f"{d.w[i]:.6e}", f"{d.f[i]:.1f}", f"{d.U[i]:.6e}", f"{d.dir[i]:.0f}",
+                    f"{load[i]:.6f}"]
             line += [f"{noisy[i]:.6f}"] * lateral + [f"{v[i]:.{k}f}" for _, v, k in extra]
             lines.append(",".join(line))
         (folder / name).write_text("\n".join(lines) + "\n")

@@ -1,8 +1,10 @@
-"""How far a form of third_generator.py is from the library: the library's laws, written once more, fitted to noise-free forces.
+"""How far a form of third_generator.py is from the library: the library's laws, written once more, fitted to
+noise-free forces.
 
-`distance` is the root of the chi2 that the best law of the cause's name leaves of the noise-free training rows, over that of
-the recalibrated baseline, both with stiffnesses and mu0 free under their priors and, for the law, sizes and shapes free: 0
-for the library's own formula, 1 where no law explains anything. Laws start at the best of random sizes and shapes.
+`distance` is the root of the chi2 that the best law of the cause's name leaves of the noise-free training rows, over
+that of the recalibrated baseline. Both have stiffnesses and mu0 free under their priors; the law also has its sizes and
+shapes. It is 0 for the library's own formula, 1 where no law explains anything. A fit starts at the best two of random
+sizes and shapes, so a distance is an upper bound.
 """
 from types import SimpleNamespace
 
@@ -16,7 +18,7 @@ INERTIA_PASSES, INERTIA_TRIES = 36, 40
 
 
 def law(name, *parameters):
-    """Registers a law: each parameter is (low, high), on a logarithmic scale where `low` is positive and far below `high`."""
+    """Registers a law: each parameter is (low, high), on a logarithmic scale where low is far below high."""
     def add(act):
         LAWS.setdefault(name, []).append((act, parameters))
         return act
@@ -48,12 +50,14 @@ def gap_share(c, a, film, solid, b, finite):
 
 @law("squeeze_film", (2e4, 4e6))
 def _(c, d, s):
-    c.F = c.F * gap_share(c, np.maximum(s * c.w / 2, 1e-9), AIR * d.p / 101325 * d.F_ref / 0.3, SOLID * d.F_ref / 0.3, 0.0, False)
+    c.F = c.F * gap_share(c, np.maximum(s * c.w / 2, 1e-9), AIR * d.p / 101325 * d.F_ref / 0.3, SOLID * d.F_ref
+                          / 0.3, 0.0, False)
 
 
 @law("squeeze_film", (2e4, 4e6), (0.05, 5), (0.4, 3), (0, 0.6))
 def _(c, d, s, area, solid, b):
-    c.F = c.F * gap_share(c, np.maximum(s * c.w / 2, 1e-9), area * AIR * d.p / 101325 * d.F_ref / 0.3, solid * d.F_ref / 0.3, b, True)
+    c.F = c.F * gap_share(c, np.maximum(s * c.w / 2, 1e-9), area * AIR * d.p / 101325 * d.F_ref / 0.3, solid
+                          * d.F_ref / 0.3, b, True)
 
 
 @law("squeeze_film", *POWERS)
@@ -77,7 +81,8 @@ def _(c, d, inverse, knee):
 
 @law("lateral_recovery", (3e-7, 1e-3))
 def _(c, d, tau):
-    c.march = (lambda x, dt: x * np.exp(-dt / tau), lambda x, before, top, drag, dt: top + (x - top) * np.exp(-dt / tau))
+    c.march = (lambda x, dt: x * np.exp(-dt / tau), lambda x, before, top, drag, dt: top + (x - top)
+               * np.exp(-dt / tau))
 
 
 @law("lateral_recovery", (3e-7, 1e-3))
@@ -198,7 +203,8 @@ def _(c, d, fa):
             q = c.kn[:, None] * (a[:, None] * np.cos(turning((depth + fa / c.kn) / a)) + depth[:, None])
             return np.where(q > -fa[:, None], q + fa[:, None], 0)
         # The loaded branch: the largest depth at which contact and pull together carry the load.
-        return force(bisect(-a, a + 2 * (c.F + fa) / c.kn, lambda x: (force(x) - fa[:, None] * (force(x) > 0)).mean(1) - c.F, 40))
+        return force(bisect(-a, a + 2 * (c.F + fa) / c.kn, lambda x: (force(x) - fa[:, None]
+                                                            * (force(x) > 0)).mean(1) - c.F, 40))
     c.press = press
 
 
@@ -441,7 +447,8 @@ class Fit:
         """Residuals (points x passes) of a law at several points: three nuisances, then sizes and shapes."""
         points = np.atleast_2d(points)
         if len(points) > TOGETHER:
-            return np.vstack([self.residuals(act, part, parameters) for part in np.split(points, range(TOGETHER, len(points), TOGETHER))])
+            return np.vstack([self.residuals(act, part, parameters) for part in np.split(points,
+                                                            range(TOGETHER, len(points), TOGETHER))])
         n, k = len(self.lateral), len(points)
         each = np.repeat(points, n, 0).T
         theta = [np.exp(x) if logarithmic(b) else x for x, b in zip(each[3:], parameters)]
@@ -455,7 +462,8 @@ class Fit:
         bounds = np.array([[np.log(b) for b in p] if logarithmic(p) else p for p in parameters], float).reshape(-1, 2)
         low, high = np.concatenate([[-12.0] * 3, bounds[:, 0]]), np.concatenate([[12.0] * 3, bounds[:, 1]])
         count = SCANNED * len(bounds)
-        tries = np.column_stack([np.tile(self.base, (count, 1)), rng.uniform(bounds[:, 0], bounds[:, 1], (count, len(bounds)))])
+        tries = np.column_stack([np.tile(self.base, (count, 1)), rng.uniform(bounds[:, 0], bounds[:, 1],
+                                                            (count, len(bounds)))])
         slopes = self.slopes(None, self.base, ())
         found = self.residuals(act, tries, parameters)
         # Nuisances follow linearly in the scan.
@@ -465,7 +473,8 @@ class Fit:
         for start in tries[np.argsort(cost)[:STARTS]]:
             out = least_squares(lambda u: np.concatenate([self.residuals(act, u, parameters)[0], u[:3]]), start,
                                 jac=lambda u: np.vstack([self.slopes(act, u, parameters).T, np.eye(3, len(u))]),
-                                bounds=(low - 1e-9, high + 1e-9), x_scale=np.maximum((high - low) / 24, 1e-9), max_nfev=EVALUATIONS)
+                                bounds=(low - 1e-9, high + 1e-9), x_scale=np.maximum((high - low) / 24,
+                                                            1e-9), max_nfev=EVALUATIONS)
             best = min(best, (self.residuals(act, out.x, parameters) ** 2).sum())
         return best
 
@@ -482,20 +491,23 @@ def nothing(c, d):
 
 
 def inertia_left(fit, rng):
-    """The same for ridges with mass: a scan, twice narrowed, of mass and damping in the friction ratio, nuisances linear."""
+    """The same for ridges with mass: a scan of mass and damping, twice narrowed, with linear nuisances."""
     chi2 = (fit.residuals(nothing, fit.base, ())[0]) ** 2
     keep = np.sort(np.argsort(-chi2)[::2][:INERTIA_PASSES])
     small = Fit.__new__(Fit)
-    small.d, small.lateral, small.normal, small.sd = rows(fit.d, keep), fit.lateral[keep], fit.normal[keep], fit.sd[keep]
+    small.d, small.lateral, small.normal, small.sd = rows(fit.d,
+                                                          keep), fit.lateral[keep], fit.normal[keep], fit.sd[keep]
     small.nominal, small.widths, small.base = fit.nominal, fit.widths, fit.base
     slopes, best = small.slopes(None, fit.base, ()), np.inf
     for landing in (1.0, 0.2):
         def act(c, d, mass, zeta):
             critical = 2 * np.sqrt(c.kn * mass)
-            c.mean = lambda c: bounce(c, mass, zeta * critical, 0.0, 60.0, 2 * landing * np.sqrt(60 * c.kn * mass), 0.0, 40, 12)
+            c.mean = lambda c: bounce(c, mass, zeta * critical, 0.0, 60.0, 2 * landing * np.sqrt(60 * c.kn * mass),
+                                      0.0, 40, 12)
         centre, width = np.array([np.log(8e-6), np.log(0.45)]), np.array([1.15, 1.0])
         for _ in range(3):
-            theta = np.clip(centre + width * rng.uniform(-1, 1, (INERTIA_TRIES, 2)), np.log([2.5e-6, 0.1]), np.log([4e-5, 1.0]))
+            theta = np.clip(centre + width * rng.uniform(-1, 1, (INERTIA_TRIES, 2)), np.log([2.5e-6, 0.1]),
+                            np.log([4e-5, 1.0]))
             tries = np.column_stack([np.tile(fit.base, (INERTIA_TRIES, 1)), theta])
             found = small.residuals(act, tries, ((1e-9, 1), (1e-9, 1)))
             moved = np.linalg.solve(slopes @ slopes.T + np.eye(3), -(found @ slopes.T).T - fit.base[:, None]).T
@@ -506,7 +518,7 @@ def inertia_left(fit, rng):
 
 
 def distance(form, values, d, rig):
-    """What the library's nearest law of the form's name leaves of its noise-free gap, as a share of its root mean square."""
+    """What the nearest law of the form's name leaves of its noise-free gap, as a share of its root mean square."""
     rng = np.random.default_rng(36)
     train = rows(d, ~d.hidden)
     lateral, normal = (x[~d.hidden] for x in evaluate(d, form.act, values, rig["mu0"], rig["kn_true"], rig["kl_true"]))
