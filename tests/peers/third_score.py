@@ -52,7 +52,8 @@ def judged(folder, verdict):
     s["truth_p"] = next((p for e, p in s["stated"] if e == s["right_name"]), 0.0)
     named = s["verdict"] == "named"
     s["right"] = named and s["top"] == truth["cause"]
-    s["wrong"] = named and s["top"] != truth["cause"]
+    s["member"] = named and set(s["top"]) < set(truth["cause"])
+    s["wrong"] = named and not s["right"] and not s["member"]
     s["in_class"] = s["right"] or (s["verdict"] == "ambiguous" and "+".join(truth["cause"]) in
                                    ["+".join(sorted(c.split("+"))) if isinstance(c, str) else "+".join(sorted(c))
                                     for c in s["class"]])
@@ -73,9 +74,12 @@ def judged(folder, verdict):
     return s
 
 
-PLACES = {"stiffness_error": "finger", **{n: "plate" for n in (
-    "amplitude_miscalibration", "amplitude_droop", "amplitude_saturation", "resonance_detuning", "mode_shape")}, **{n: "instrument" for n in (
-        "force_crosstalk", "lateral_offset_drift", "normal_offset", "plate_tilt", "speed_error", "speed_ripple")}}
+PLACES = {
+    "stiffness_error": "finger",
+    **dict.fromkeys(("amplitude_miscalibration", "amplitude_droop", "amplitude_saturation", "resonance_detuning", "mode_shape"),
+                    "plate"),
+    **dict.fromkeys(("force_crosstalk", "lateral_offset_drift", "normal_offset", "plate_tilt", "speed_error", "speed_ripple"),
+                    "instrument")}
 
 
 def share(sets, test):
@@ -119,14 +123,17 @@ def figures(sets):
     say("  of those unknown: right among all described", share(unknown, lambda s: s["structure"] in s["description"]))
     clear = [s for s in pairs if s["detectable"] and min(s["alone"]) >= 30]
     say("pairs (each member alone has a chi2 of 30): both named", share(clear, lambda s: s["right"]))
-    say("  named wrong", share(clear, lambda s: s["wrong"] and not set(s["top"]) <= set(s["cause"])))
-    say("  one member alone named", share(clear, lambda s: s["wrong"] and set(s["top"]) < set(s["cause"])))
+    say("  named wrong", share(clear, lambda s: s["wrong"]))
+    say("  one member alone named", share(clear, lambda s: s["member"]))
     say("  at_least right; wrong",
         f"{sum(bool(s['at_least']) and set(s['at_least']) <= set(s['cause']) for s in clear)}; "
         f"{sum(bool(set(s['at_least']) - set(s['cause'])) for s in clear)}")
     told = none + [s for s in seen + shown + clear]
-    sure = [(e == s["right_name"], s) for s in told for e, p in s["stated"] if p >= SURE]
-    say("stated 0.99 and more is right", share(sure, lambda x: x[0]))
+    sure = [(e, e == s["right_name"], s) for s in told for e, p in s["stated"] if p >= SURE]
+    say("stated 0.99 and more is right", share(sure, lambda x: x[1]))
+    say("  of those that state a cause", share([x for x in sure if x[0] and x[0] != ["unknown"]], lambda x: x[1]))
+    for words in ("single", "pair", "stranger"):
+        say(f"  of a {words}", share([x for x in sure if x[2]["stratum"] == words], lambda x: x[1]))
     for words, part in (("singles", seen), ("pairs", clear), ("strangers", shown), ("none", none), ("all", told)):
         if part:
             scores = [np.log(max(s["truth_p"], 1e-9)) for s in part]
@@ -150,9 +157,10 @@ def figures(sets):
     for key in ("noise", "design"):
         for value in sorted({s[key] for s in sets}):
             part = [s for s in seen if s[key] == value]
+            every, still = [s for s in sets if s[key] == value], [s for s in none if s[key] == value]
             say(f"{key} {value}: named right; wrong; gap claimed of none",
-                f"{share(part, lambda s: s['right'])}; {sum(s['wrong'] for s in sets if s[key] == value)} of "
-                f"{sum(s[key] == value for s in sets)}; {sum(s['verdict'] != 'no_gap' for s in none if s[key] == value)} of {sum(s[key] == value for s in none)}")
+                f"{share(part, lambda s: s['right'])}; {sum(s['wrong'] for s in every)} of {len(every)}; "
+                f"{sum(s['verdict'] != 'no_gap' for s in still)} of {len(still)}")
     print("cause: detectable, right, in class, unknown, wrong; distances")
     for name in sorted({s["cause"][0] for s in singles}):
         part = [s for s in seen if s["cause"] == [name]]
