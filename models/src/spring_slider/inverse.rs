@@ -13,7 +13,7 @@ use crate::quantity::PeakToPeak;
 use crate::root;
 use std::f64::consts::PI;
 
-/// Step of `ln alpha`, and of the phase of slip in rad, at which Newton's method ends: what is left is its square.
+/// Step of `ln alpha`, and of the phase of slip in rad, at which Newton's method ends: its square is left.
 const CLOSE: f64 = 1e-6;
 /// The search ends this far from the angle at which contact is never lost.
 const UP_TO: f64 = 1.0 - 1e-6;

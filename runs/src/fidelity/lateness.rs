@@ -37,7 +37,7 @@ pub(super) struct Found {
 
 /// Steps of the search either side of what is known.
 const STEPS: i32 = 120;
-/// How far it goes: this time at the speed of the pass, at least this way, and at most this share of a period.
+/// How far it goes: this time at the speed of the pass, at least this way, at most this share of a period.
 const UP_TO_S: f64 = 0.12;
 const UP_TO_M: f64 = 0.2e-3;
 const UP_TO_PERIODS: f64 = 0.45;
