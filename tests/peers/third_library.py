@@ -70,7 +70,6 @@ def _(c, d, *theta):
     c.factor = exponent_of_lift(c, d, *theta)
 
 
-# Two more laws recover in flight only. They slip back at once, so they lift off without stretch: they are the baseline.
 @law("lateral_recovery", (1, 3000), (1e-9, 3e-6))
 def _(c, d, inverse, knee):
     def fall(x, dt):

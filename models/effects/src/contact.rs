@@ -51,10 +51,10 @@ pub struct Contact {
     pub recovery_knee: f64,
     /// Relaxation time of the lateral stretch out of contact, s. 0 in the baseline.
     pub lateral_relaxation_time: f64,
-    /// Exponent of that relaxation: 1 exponential, less for a broad spectrum of times.
-    pub lateral_relaxation_exponent: f64,
-    /// What a stretch beyond the friction limit does in contact, where recovery is finite.
-    pub slip_back: SlipBack,
+    /// Whether a stretch beyond the friction limit recovers towards the limit while the plate goes on drawing
+    /// the skin along, in slip against viscosity (Perzyna); else it follows the limit down no faster than the
+    /// recovery allows, and does not grow. In flight it recovers in either case.
+    pub viscous_slip: bool,
     /// Time in which bonds form after touch-down, s. 0 in the baseline.
     pub bonding_time: f64,
     /// Exponent of the growth of bonds: 1 first order, 0.5 stretched.
@@ -73,17 +73,6 @@ pub struct Contact {
     pub landing: usize,
     /// Whether a sweep may be coarse: for searches that only look for places to begin.
     pub coarse: bool,
-}
-
-/// What the stretch does in contact while the spring pulls harder than friction holds. In flight it recovers in each case.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub enum SlipBack {
-    /// It follows the limit down no faster than the recovery allows, and does not grow.
-    Recovering,
-    /// It follows the limit down at once: finite recovery holds in flight only.
-    Instant,
-    /// It recovers towards the limit while the plate goes on drawing the skin along: slip against viscosity (Perzyna).
-    Drawn,
 }
 
 /// Attraction between skin and plate that friction feels beside the normal force.

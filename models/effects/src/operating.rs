@@ -1,6 +1,6 @@
 //! The baseline's parameters, what the whole design says about scales, and what a reading is.
 
-use crate::contact::{Contact, SlipBack};
+use crate::contact::Contact;
 use models::condition::Condition;
 
 /// Reference scales of a whole table: effects that need a zero of time, load or temperature take it from here.
@@ -64,8 +64,7 @@ impl Baseline {
             inverse_recovery_speed: 0.0,
             recovery_knee: 0.0,
             lateral_relaxation_time: 0.0,
-            lateral_relaxation_exponent: 1.0,
-            slip_back: SlipBack::Recovering,
+            viscous_slip: false,
             bonding_time: 0.0,
             bonding_exponent: 1.0,
             asperity_height: 0.0,

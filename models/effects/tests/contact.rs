@@ -3,7 +3,7 @@ use models::condition::Condition;
 use models::quantity::PeakToPeak;
 use muprime_effects::contact::asperities::Heights;
 use muprime_effects::contact::impact::{Bouncing, LANDINGS, STATED_ERROR};
-use muprime_effects::contact::{Attraction, Contact, SlipBack, half_contact_angle, mean_friction};
+use muprime_effects::contact::{Attraction, Contact, half_contact_angle, mean_friction};
 use muprime_effects::{Baseline, Design};
 use std::f64::consts::PI;
 
@@ -204,19 +204,13 @@ fn tabulated_angle_balances_the_load() {
     assert!(worst < 2e-6, "{worst:e}");
 }
 
-/// A knee far below the stretch is the plain rate limit; far above it, the exponential whose time is knee over speed.
+/// A knee far below the stretch is the plain rate limit.
 #[test]
-fn a_soft_recovery_has_both_limits() {
+fn a_hard_knee_is_the_plain_rate_limit() {
     let c = contact(3e-6, 0.02, 0.25, 1e6, 0.4e6);
     let plain = mean_friction(&Contact { inverse_recovery_speed: 200.0, ..c });
     let hard = mean_friction(&Contact { inverse_recovery_speed: 200.0, recovery_knee: 1e-14, ..c });
     assert!((plain / hard - 1.0).abs() < 1e-4, "{plain} {hard}");
-    // In flight only: in contact an exponential relaxes towards what the limit holds, a soft speed towards rest.
-    let flight = Contact { slip_back: SlipBack::Instant, ..c };
-    let slow = mean_friction(&Contact { inverse_recovery_speed: 0.02, recovery_knee: 1e-3, ..flight });
-    let exponential =
-        mean_friction(&Contact { lateral_relaxation_time: 2e-5, lateral_relaxation_exponent: 1.0, ..flight });
-    assert!((slow / exponential - 1.0).abs() < 1e-3, "{slow} {exponential}");
 }
 
 /// Johnson, Kendall and Roberts: at no load the contact holds as if pressed with four times its pull-off force.
@@ -239,12 +233,7 @@ fn slip_against_viscosity_is_that_of_small_steps() {
         (2e-6, 0.04, 0.5, 1e-7),
     ] {
         let c = contact(amplitude, speed, load, 1e6, 0.4e6);
-        let swept = mean_friction(&Contact {
-            slip_back: SlipBack::Drawn,
-            lateral_relaxation_time: time,
-            lateral_relaxation_exponent: 1.0,
-            ..c
-        });
+        let swept = mean_friction(&Contact { viscous_slip: true, lateral_relaxation_time: time, ..c });
         let scale = c.normal_stiffness * c.half_amplitude();
         let phi = half_contact_angle(c.load_ratio(), 0.0);
         let offset = if phi >= PI { c.load_ratio() } else { -phi.cos() };

@@ -133,3 +133,29 @@ fn bounds_of_coordinates_are_bounds_of_values() {
         }
     }
 }
+
+/// At two deviations of its size, its shapes in the middle, every law departs from the baseline somewhere by
+/// more than a sweep's error: a law that cannot is no hypothesis. Lags alone leave steady passes as they are.
+#[test]
+fn every_law_departs_from_the_baseline() {
+    let baseline = Baseline { mu0: 0.6, normal_stiffness_n_per_m: 2e6, lateral_stiffness_n_per_m: 0.8e6 };
+    let mut idle = Vec::new();
+    for effect in known() {
+        for (law, form) in effect.laws.iter().enumerate() {
+            let middle =
+                |(i, p): (usize, &muprime_effects::Parameter)| p.value(if i == 0 { 2.0 } else { 0.0 });
+            let theta: Vec<f64> = form.parameters.iter().enumerate().map(middle).collect();
+            let active = [Active { effect, law, theta: &theta }];
+            let change = |pass: &Condition| {
+                let without = baseline.lateral_force(pass, &DESIGN);
+                (muprime_effects::lateral_force(&baseline, &active, pass, &DESIGN) / without - 1.0).abs()
+            };
+            let most = passes().iter().map(change).fold(0.0, f64::max);
+            println!("{:26} {:44} {most:.1e}", effect.name, form.name);
+            if most < 1e-2 && !["sensor_lag", "time_misalignment"].contains(&effect.name) {
+                idle.push(format!("{} ({})", effect.name, form.name));
+            }
+        }
+    }
+    assert!(idle.is_empty(), "as the baseline: {idle:?}");
+}

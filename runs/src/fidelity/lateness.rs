@@ -41,6 +41,8 @@ const STEPS: i32 = 120;
 const UP_TO_S: f64 = 0.12;
 const UP_TO_M: f64 = 0.2e-3;
 const UP_TO_PERIODS: f64 = 0.45;
+/// Nor further than this share of the shortest pass, so that what is compared stays most of it.
+const UP_TO_PASS: f64 = 0.25;
 /// Samples of a pass that are compared at most.
 const COMPARED: usize = 2000;
 /// Standard deviations, and cycles of the loop, by which a part that is slower than known exceeds it.
@@ -101,7 +103,13 @@ pub(super) fn of(
     known: Option<&Dynamics>,
     (lead_s, period_m, open): (f64, Option<f64>, bool),
 ) -> Found {
-    let half = (UP_TO_S * speed).max(UP_TO_M).min(period_m.map_or(f64::INFINITY, |m| UP_TO_PERIODS * m));
+    let slid = |pass: &&Rendered| match (pass.samples.first(), pass.samples.last()) {
+        (Some(first), Some(last)) => (last.x_m - first.x_m).abs(),
+        _ => 0.0,
+    };
+    let shortest = passes.iter().map(slid).fold(f64::INFINITY, f64::min);
+    let most = period_m.map_or(f64::INFINITY, |m| UP_TO_PERIODS * m).min(UP_TO_PASS * shortest);
+    let half = (UP_TO_S * speed).max(UP_TO_M).min(most);
     let found = |known_s: f64, from: fn(&Sample) -> f64, to: fn(&Sample) -> f64| -> Vec<(Pair, f64, bool)> {
         let each = |pass: &&Rendered| {
             let pair = Pair::of(pass, from, to);
@@ -144,5 +152,42 @@ pub(super) fn of(
         rms_held_out: (ways.len() > 1).then(|| rms(&others)),
         parts,
         ways,
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// Sines with delays that are put in, on a stroke shorter than the search would like.
+    #[test]
+    fn delays_that_were_put_in_are_found_and_what_exceeds_the_known_is_slower() {
+        let (speed, period, cycle_s) = (0.04, 1e-3, 1e-3);
+        let known = Dynamics {
+            ring_time_s: 1e-3,
+            amplifier_s: 0.0,
+            cycle_s,
+            sensor_hz: None,
+            sensor_delay_s: 2e-3,
+            pad_n_per_m: None,
+        };
+        let pass = |forward: bool| {
+            let sign = if forward { 1.0 } else { -1.0 };
+            let of = |k: u32| {
+                let way = speed * cycle_s * f64::from(k);
+                let at = |late_s: f64| (std::f64::consts::TAU * (way - speed * late_s) / period).sin();
+                let [wanted, predicted, measured] = [0.0, 6e-3, 8e-3].map(|late| 0.6 + 0.1 * at(late));
+                Sample { x_m: sign * way, wanted, commanded_pp_m: 1e-6, predicted, measured, reached: true }
+            };
+            Rendered { point: 0, key: [speed, 0.25, 3e4], forward, samples: (0..60).map(of).collect() }
+        };
+        let passes = [pass(true), pass(false), pass(true)];
+        let passes: Vec<&Rendered> = passes.iter().collect();
+        let found = of(&passes, speed, Some(&known), (0.0, Some(period), true));
+        let [drive, sensor] = &found.parts[..] else { panic!("{:?}", found.parts) };
+        assert!((drive.delay_s - 6e-3).abs() < 5e-5 && drive.slower, "{drive:?}");
+        assert!((sensor.delay_s - 2e-3).abs() < 5e-5 && !sensor.slower, "{sensor:?}");
+        assert!(found.ways.iter().all(|way| (way / speed - 8e-3).abs() < 5e-5), "{:?}", found.ways);
+        assert!(found.rms_known.unwrap() > 0.05 && found.rms_held_out.unwrap() < 2e-3);
     }
 }

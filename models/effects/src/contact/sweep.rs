@@ -3,11 +3,11 @@
 //! Semantics of finite recovery (section 5.3 of the paper, as its figures show it): in contact the stretch
 //! grows with the plate; where the spring's force passes the limit the slider slips and the force is the
 //! limit, while the stretch follows the limit down no faster than the recovery allows; out of contact the
-//! force is zero and the stretch recovers; the next contact starts from what is left. The other two ways of
-//! [`SlipBack`] change what the stretch does while it slips, not the force.
+//! force is zero and the stretch recovers; the next contact starts from what is left. Viscous slip changes
+//! what the stretch does while it slips, not the force.
 
 use crate::contact::retarded::Retarded;
-use crate::contact::{Contact, SlipBack, half_contact_angle};
+use crate::contact::{Contact, half_contact_angle};
 use std::f64::consts::PI;
 
 /// Points over the contact. The mean force is then within 1e-3 of the converged sweep (tested).
@@ -120,28 +120,22 @@ impl Lateral {
             if time < 1e-15 {
                 1.0
             } else if c.lateral_relaxation_time > 0.0 {
-                let age = time / c.lateral_relaxation_time;
-                if c.lateral_relaxation_exponent == 1.0 {
-                    (-age).exp()
-                } else {
-                    (-age.powf(c.lateral_relaxation_exponent)).exp()
-                }
+                (-time / c.lateral_relaxation_time).exp()
             } else if rate.is_finite() {
                 1.0
             } else {
                 0.0
             }
         };
-        let instant = c.slip_back == SlipBack::Instant;
         let fall = |time: f64| if rate.is_finite() { rate * time } else { 0.0 };
         Self {
             stiffness: c.lateral_stiffness,
             advance: c.speed * dt,
-            rate_step: if instant { f64::INFINITY } else { fall(dt) },
-            keep_step: if instant { 0.0 } else { keep(dt) },
+            rate_step: fall(dt),
+            keep_step: keep(dt),
             // Of what a step adds evenly, this much is still there at its end.
-            drawn: match (c.slip_back, c.lateral_relaxation_time) {
-                (SlipBack::Drawn, t) if t > 0.0 => -(-dt / t).exp_m1() * t / dt,
+            drawn: match c.lateral_relaxation_time {
+                t if c.viscous_slip && t > 0.0 => -(-dt / t).exp_m1() * t / dt,
                 _ => 0.0,
             },
             rate_airborne: fall(airborne),
