@@ -16,6 +16,9 @@ const HEAD: &str = "name = \"r\"\nseed = 5\nreference_every = 4\n[pass]\nsettle_
 const GREY: &str = "89504e470d0a1a0a0000000d4948445200000003000000020800000000b81f39c60000000e49444154789c63600082ffc66700043701ff995abdb60000000049454e44ae426082";
 const COLOURED: &str = "89504e470d0a1a0a0000000d494844520000000100000002080200000016e321700000000e49444154789c63600082ffc66700043701ff995abdb60000000049454e44ae426082";
 
+/// The head of an image of 60,000 x 60,000 pixels, and nothing else.
+const HUGE: &str = "89504e470d0a1a0a0000000d494844520000ea600000ea600800000000a5b92a9e0000000849444154789c030000000001480689d20000000049454e44ae426082";
+
 fn job(out: &Path, render: &str, series: &str) -> Job {
     let setup = Setup::load("virtual-ideal").unwrap();
     let text = format!("{HEAD}[render]\n{render}\n[[series]]\n{series}\n");
@@ -213,9 +216,12 @@ fn a_table_is_a_target_in_either_unit_and_a_row_of_an_image_is_one() {
         tests::muprime().arg("check").arg(&plan).output().unwrap().status.code()
     };
     assert_eq!((checked("image.png"), checked("none.png")), (Some(0), Some(2)));
-    for (hex, text, expected) in
-        [(COLOURED, "", "not grey"), (GREY, "row = 2", "row 2 of 3 x 2 pixels"), (&GREY[..60], "", "PNG")]
-    {
+    for (hex, text, expected) in [
+        (COLOURED, "", "not grey"),
+        (GREY, "row = 2", "row 2 of 3 x 2 pixels"),
+        (&GREY[..60], "", "PNG"),
+        (HUGE, "", "60000 x 60000 pixels"),
+    ] {
         let message = format!("{:?}", image(hex, text).unwrap_err());
         let message =
             message.replace(['\u{2502}', '\n'], " ").split_whitespace().collect::<Vec<_>>().join(" ");

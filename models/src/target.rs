@@ -17,15 +17,11 @@ pub struct Target {
     pub mu_relative: Vec<f64>,
     /// Time in s by which the target is read ahead of the position, at the speed of the pass: what loop,
     /// amplifier and plate are known to take.
-    #[serde(default, skip_serializing_if = "is_zero")]
+    #[serde(default, skip_serializing_if = "crate::quantity::is_zero")]
     pub lead_s: f64,
     /// Gains of a feedback on the measured friction; none: open loop.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub feedback: Option<Feedback>,
-}
-
-fn is_zero(value: &f64) -> bool {
-    *value == 0.0
 }
 
 /// A proportional and integral correction of the wanted `mu'` by the measured one.

@@ -299,7 +299,7 @@ def soaks_late(c, d, s, middle, width):
 
 @cause("moisture_drift", 0.02, 1.2, needs="runs", middle=(0.3, 0.6))
 def wetter_in_each_run(c, d, s, middle):
-    # The skin dries between runs; in each it takes up water anew, and less as the runs go on.
+    # The skin dries between runs; in each it takes up water again, and less as the runs go on.
     share = d.trun / d.run_length
     c.mu = c.mu * (1 + s * share / (share + middle) * np.exp(-0.1 * (d.run - 1)))
 

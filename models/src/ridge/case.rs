@@ -55,7 +55,7 @@ pub struct RidgeCase {
     pub mass_damping_per_s: f64,
     /// Stiffness-proportional damping in s: stress is that of the strain and so much times its rate. 0 by default. It divides the
     /// stable step by its ratio at the mesh's highest frequency: hundreds, where it is critical at the plate's.
-    #[serde(default, skip_serializing_if = "is_zero")]
+    #[serde(default, skip_serializing_if = "crate::quantity::is_zero")]
     pub stiffness_damping_s: f64,
     /// Elements, about.
     pub elements: usize,
@@ -69,11 +69,6 @@ pub struct RidgeCase {
 
 const fn one() -> f64 {
     1.0
-}
-
-#[expect(clippy::trivially_copy_pass_by_ref, reason = "serde hands a reference")]
-fn is_zero(value: &f64) -> bool {
-    *value == 0.0
 }
 
 /// Mean pressure in Pa over the contact of a whole finger pressed with `normal_force_n`, growing with the

@@ -42,7 +42,7 @@ fn shift(group: &Group) -> String {
 /// The parts that come later than known, in sentences.
 fn slower(group: &Group) -> Vec<String> {
     let of = |late: &Late| {
-        // The scatter of a rendered run may be some microseconds: 10 are what anyone reads.
+        // Scatter below 10 us is stated as 10 us.
         let [delay, sd, known] =
             [late.delay_s, late.sd_s.max(1e-5), late.known_s].map(|s| format!("{:.2}", s * 1e3));
         let (what, remedy) = match late.part.as_str() {
@@ -53,7 +53,7 @@ fn slower(group: &Group) -> Vec<String> {
             _ => (
                 "the amplitude comes",
                 format!(
-                    "amplifier or plate are slower than stated; lead_s = {:.4} in [render] reads the target ahead",
+                    "amplifier or plate is slower than stated; lead_s = {:.4} in [render] reads the target ahead",
                     late.delay_s + group.lead_s
                 ),
             ),

@@ -6,6 +6,9 @@ use crate::plan::Plan;
 use models::target::Target;
 use std::path::{Path, PathBuf};
 
+/// Bytes of an image at most.
+const MOST_BYTES: usize = 64 << 20;
+
 impl RenderPlan {
     /// The file, beside the plan.
     fn path(&self, plan: &Plan) -> PathBuf {
@@ -107,14 +110,18 @@ impl RenderPlan {
                 "save it as a grey image without transparency",
             ));
         }
-        let size = reader.output_buffer_size().ok_or_else(|| unread(&"the image is too large"))?;
-        let mut pixels = vec![0; size];
-        let frame = reader.next_frame(&mut pixels).map_err(|e| unread(&e))?;
-        let row = self.row.unwrap_or(frame.height / 2);
-        if row >= frame.height || frame.width < 2 || f64::from(frame.width) > MOST {
-            let problem = format!("row {row} of {} x {} pixels", frame.width, frame.height);
+        let (width, height) = (reader.info().width, reader.info().height);
+        let row = self.row.unwrap_or(height / 2);
+        if row >= height || width < 2 || f64::from(width) > MOST {
+            let problem = format!("row {row} of {width} x {height} pixels");
             return Err(refuse(problem, "rows count from 0; a row has 2 to 200000 pixels"));
         }
+        // Before anything is reserved: the size is what the file states of itself.
+        let Some(size) = reader.output_buffer_size().filter(|size| *size <= MOST_BYTES) else {
+            return Err(refuse(format!("{width} x {height} pixels"), "crop the image to 64 MB and less"));
+        };
+        let mut pixels = vec![0; size];
+        let frame = reader.next_frame(&mut pixels).map_err(|e| unread(&e))?;
         let line = &pixels[row as usize * frame.line_size..][..frame.line_size];
         let grey: Vec<f64> = match frame.bit_depth {
             png::BitDepth::Sixteen => line
