@@ -58,6 +58,11 @@ struct Line {
     structure: Option<String>,
     description: Vec<String>,
     seconds: f64,
+    passes: usize,
+    gap_chi2: f64,
+    shapes: f64,
+    /// Names, log evidence, chi2 left, pull, share.
+    fits: Vec<(String, f64, f64, f64, f64)>,
     /// Verdict, names and probabilities with each changed constant of the decision.
     changed: Vec<Changed>,
 }
@@ -149,6 +154,23 @@ fn score(folder: &Path, options: &Options, changes: &[Constants]) -> Result<Line
             })
             .collect(),
         seconds,
+        passes: fitted.problem.len(),
+        gap_chi2: fitted.problem.misfit(&fitted.none.prediction),
+        shapes: muprime_diagnosis::structure::shapes::nats(&fitted.shapes),
+        fits: fitted
+            .candidates
+            .iter()
+            .map(|c| {
+                let b = &c.best;
+                (
+                    c.names().join("+"),
+                    c.log_evidence - none,
+                    fitted.problem.misfit(&b.prediction),
+                    b.pull(),
+                    b.share,
+                )
+            })
+            .collect(),
         changed,
     })
 }

@@ -72,7 +72,7 @@ pub fn decide(fitted: &mut Fitted) -> Decision {
     let (k, candidates) = (&*fitted.problem.constants, &fitted.candidates);
     if claimed {
         // An effect that cannot predict what it has not seen is no cause: its weight goes to the open set.
-        let survival = judged.survival(k, candidates[leader].effects.len(), candidates[leader].best.share);
+        let survival = judged.survival(k, candidates[leader].best.share);
         for p in &mut probabilities {
             unknown += *p * (1.0 - survival);
             *p *= survival;
@@ -86,17 +86,30 @@ pub fn decide(fitted: &mut Fitted) -> Decision {
         && class[1..].iter().all(|&i| !same_said(fitted, leader, i))
         && departed.is_empty();
     class.extend(departed);
-    let in_class: f64 = class.iter().map(|&i| probabilities[i]).sum();
+    let of = |class: &[usize], p: &[f64]| class.iter().map(|&i| p[i]).sum::<f64>();
+    let leads = probabilities[leader] >= alone * of(&class, &probabilities);
+    let (none, unknown) = doubted(fitted, none, unknown, &mut probabilities);
+    let in_class = of(&class, &probabilities);
     let verdict = if !claimed || none >= in_class.max(unknown) {
         Verdict::NoGap
     } else if unknown >= in_class {
         Verdict::Unknown
-    } else if distinct && in_class >= k.name_probability && probabilities[leader] >= alone * in_class {
+    } else if distinct && leads && in_class >= k.name_probability {
         Verdict::Named
     } else {
         Verdict::Ambiguous
     };
     Decision { verdict, none, unknown, probabilities, class, gate: judged, regions }
+}
+
+/// Probabilities with the chance that the method errs and does not see it: no probability of a truth is then
+/// 1e-40, and none that is stated beyond what verdicts on labelled sets have shown.
+fn doubted(fitted: &Fitted, none: f64, unknown: f64, probabilities: &mut [f64]) -> (f64, f64) {
+    let doubt = fitted.problem.constants.doubt;
+    let (no_gap, open, each) = fitted.coarse();
+    let mixed = |p: f64, coarse: f64| (1.0 - doubt) * p + doubt * coarse;
+    probabilities.iter_mut().zip(each).for_each(|(p, coarse)| *p = mixed(*p, coarse));
+    (mixed(none, no_gap), mixed(unknown, open))
 }
 
 /// The leader on the left-out regions. Of its laws that the evidence does not tell apart the one that
@@ -111,11 +124,10 @@ fn judged(fitted: &mut Fitted, leader: usize, claimed: bool) -> (Vec<Region>, Ga
     if laws.is_empty() {
         laws.push(own.best.clone());
     }
-    let effects = own.effects.len();
     let judge = |law: Posterior| {
         let regions = left_out_regions(fitted, &law);
         let gate = gate(&k, &regions);
-        (gate.survival(&k, effects, law.share), law, regions, gate)
+        (gate.survival(&k, law.share), law, regions, gate)
     };
     let all = laws.into_iter().map(judge);
     let (_, law, regions, gate) =
@@ -198,7 +210,8 @@ fn same_said(fitted: &Fitted, leader: usize, rival: usize) -> bool {
 fn fold_pairs(fitted: &Fitted, probabilities: &mut [f64]) {
     let problem = &fitted.problem;
     let k = &problem.constants;
-    let gap = left(fitted, &fitted.none);
+    // What the stiffnesses took up is gap too.
+    let gap = left(fitted, &fitted.none) + fitted.none.pull();
     let candidates = &fitted.candidates;
     for pair in 0..candidates.len() {
         let own = &candidates[pair];
@@ -215,14 +228,13 @@ fn fold_pairs(fitted: &Fitted, probabilities: &mut [f64]) {
                 let gain = own.log_evidence - c.log_evidence;
                 let c_left = left(fitted, &c.best);
                 let scatter = (2.0 * problem.len() as f64).sqrt();
-                let needed =
-                    c_left > k.misfit_sd * scatter && own_left < k.pair_halves * c_left && gain > k.pair_nats;
+                let misfit = c_left > k.misfit_sd * scatter;
+                let needed = misfit && own_left < k.pair_halves * c_left && gain > k.pair_nats;
                 // Or the pair leaves nothing that the scatter does not, and the single cause does.
-                let complete = own_left < k.pair_complete_sd * scatter
-                    && c_left > k.misfit_sd * scatter
-                    && gain > k.pair_complete_nats;
+                let complete = misfit && own_left < k.pair_complete_sd * scatter;
+                let large = 2.0 * gain >= k.pair_gain_share * gap;
                 let pulled = c.best.pull() > own.best.pull() + k.pair_pull_chi2;
-                2.0 * gain < k.pair_gain_share * gap && !needed && !complete && !pulled
+                !(pulled || needed || gain > k.pair_least_nats && (large || complete))
             })
             .collect();
         let Some(best) = alone.iter().map(|&i| candidates[i].log_evidence).reduce(f64::max) else { continue };
@@ -234,7 +246,8 @@ fn fold_pairs(fitted: &Fitted, probabilities: &mut [f64]) {
         }));
         let evidence: Vec<f64> = heirs.iter().map(|&i| candidates[i].log_evidence / k.temper).collect();
         let total = crate::gaussian::log_sum_exp(&evidence);
-        let weight = std::mem::take(&mut probabilities[pair]);
+        let weight = probabilities[pair] * k.pair_folded;
+        probabilities[pair] -= weight;
         for (i, e) in heirs.iter().zip(&evidence) {
             probabilities[*i] += weight * (e - total).exp();
         }

@@ -149,6 +149,23 @@ impl Fitted {
             .sort_by(|a, b| b.log_probability.total_cmp(&a.log_probability).then(a.effects.cmp(&b.effects)));
     }
 
+    /// Probabilities as they would be if the evidence counted for next to nothing: of no gap, of the open set,
+    /// and of each cause. It is all that stands where the method errs without seeing it.
+    pub(crate) fn coarse(&self) -> (f64, f64, Vec<f64>) {
+        let k = &self.problem.constants;
+        let [none, smooth] = self.evidence;
+        let count = self.tried.max(1) as f64;
+        let shares = [k.prior_single / count, 2.0 * k.prior_pair / (count * (count - 1.0)).max(2.0)];
+        let least = |evidence: f64| (evidence - none) / k.doubt_temper;
+        let mut all = vec![k.prior_null.ln(), k.prior_open.ln() + least(smooth)];
+        let own = self.candidates.iter();
+        all.extend(own.map(|c| shares[c.effects.len() - 1].ln() + least(c.log_evidence)));
+        let total = log_sum_exp(&all);
+        let mut all = all.into_iter().map(|v| (v - total).exp());
+        let (no_gap, open) = (all.next().unwrap_or(0.0), all.next().unwrap_or(0.0));
+        (no_gap, open, all.collect())
+    }
+
     /// Log evidence of the best hypothesis.
     pub(crate) fn best_evidence(&self) -> f64 {
         let own = self.candidates.iter().map(|c| c.log_evidence);

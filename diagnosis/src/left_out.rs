@@ -236,10 +236,9 @@ pub struct Gate {
 impl Gate {
     /// Share of a candidate's probability that survives: one half where it closes just so much as a mimic
     /// may, and ever less below that. `share` is the form uncertainty that it needed.
-    pub fn survival(&self, k: &Constants, effects: usize, share: f64) -> f64 {
+    pub fn survival(&self, k: &Constants, share: f64) -> f64 {
         let rank = k.form_shares.iter().filter(|s| **s < share * (1.0 - 1e-9)).count();
-        let closures = if effects > 1 { k.closure_pair } else { k.closure_single };
-        let middle = closures[rank.min(closures.len() - 1)];
+        let middle = k.closure[rank.min(k.closure.len() - 1)];
         let pooled = 1.0 / (1.0 + (-(self.pooled - middle) / k.closure_scale).exp());
         let half_open = 2 * self.closed < self.carrying && self.carrying >= k.few_regions;
         if half_open { pooled.min(k.half_open_survival) } else { pooled }
