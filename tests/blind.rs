@@ -2,7 +2,7 @@
 use diagnosis::Verdict;
 use diagnosis::data::{RigFile, Table};
 use diagnosis::hypotheses::Options;
-use diagnosis::verdict::diagnose;
+use diagnosis::verdict::{Report, diagnose};
 use models::pass::Pass;
 use rayon::prelude::*;
 use sim::sealed::{Ask, Stratum, generate};
@@ -185,49 +185,29 @@ fn loss_in_the_skin_is_not_called_inertia() {
     assert!(right >= tests::rounds(1, 2), "{right} are right");
 }
 
-/// The order of rows and the numbers of points carry no meaning.
+/// The order of rows, the number of threads and the start of the clock carry no meaning.
 #[test]
-fn the_order_of_rows_carries_no_meaning() {
-    let set = generate(9201, Stratum::Single, Ask::Gain);
-    let rig = rig_of(&set.rig_toml);
-    let mut turned: Vec<Pass> = set.passes.clone();
-    turned.reverse();
-    let says = |passes: &[Pass]| {
-        let table = Table::measured(passes).unwrap();
-        serde_json::to_string(&diagnose(&table, &rig, &quick(), String::new()).report).unwrap()
-    };
-    assert_eq!(says(&set.passes), says(&turned));
-}
-
-/// The same answer whatever the number of threads.
-#[test]
-fn threads_do_not_change_the_answer() {
-    let set = generate(9202, Stratum::Single, Ask::Gain);
-    let rig = rig_of(&set.rig_toml);
-    let table = Table::measured(&set.passes).unwrap();
-    let with = |threads: usize| {
-        let pool = rayon::ThreadPoolBuilder::new().num_threads(threads).build().unwrap();
-        pool.install(|| {
-            serde_json::to_string(&diagnose(&table, &rig, &quick(), String::new()).report).unwrap()
-        })
-    };
-    assert_eq!(with(1), with(3));
-}
-
-/// Forces in another unit of time or place: starting the clock elsewhere changes nothing.
-#[test]
-fn the_clock_may_start_anywhere() {
+fn rows_threads_and_the_clocks_start_change_nothing() {
     let set = generate(9203, Stratum::Single, Ask::Gain);
     let rig = rig_of(&set.rig_toml);
-    let mut later = set.passes.clone();
-    for p in &mut later {
-        p.time_s += 4096.0;
-    }
-    let verdict = |passes: &[Pass]| {
-        let report = diagnose(&Table::measured(passes).unwrap(), &rig, &quick(), String::new()).report;
-        (report.verdict, report.hypotheses[0].effects.clone())
+    let says = |passes: &[Pass], threads: usize| {
+        let table = Table::measured(passes).unwrap();
+        let pool = rayon::ThreadPoolBuilder::new().num_threads(threads).build().unwrap();
+        pool.install(|| diagnose(&table, &rig, &quick(), String::new()).report)
     };
-    assert_eq!(verdict(&set.passes), verdict(&later));
+    let text = |report: &Report| serde_json::to_string(report).unwrap();
+    let report = says(&set.passes, 1);
+    let mut turned: Vec<Pass> = set.passes.clone();
+    turned.reverse();
+    assert_eq!(text(&says(&turned, 1)), text(&report));
+    assert_eq!(text(&says(&set.passes, 3)), text(&report));
+    let mut later = set.passes.clone();
+    later.iter_mut().for_each(|pass| pass.time_s += 4096.0);
+    let later = says(&later, 1);
+    assert_eq!(
+        (later.verdict, &later.hypotheses[0].effects),
+        (report.verdict, &report.hypotheses[0].effects)
+    );
 }
 
 /// Labels dealt to the wrong sets score as chance: the scorer does not leak.

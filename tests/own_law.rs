@@ -532,7 +532,7 @@ fn an_effect_of_ones_own_is_one_more_hypothesis() {
     let at = folder.path();
     std::fs::write(at.join("thick_film.csv"), dip_table(1e-4, 1.0)).unwrap();
     assert!(done(at, &["check", "thick_film.csv"]).is_empty());
-    let (mut named, mut inside, mut claimed, trials) = (0, 0, 0, rounds(6, 30));
+    let (mut named, mut inside, mut claimed, trials) = (0, 0, 0, rounds(3, 30));
     for seed in 0..trials {
         let (with, without) = (at.join(format!("with{seed}")), at.join(format!("without{seed}")));
         let size = 0.2 + 0.02 * seed as f64;

@@ -13,6 +13,14 @@ use std::path::Path;
 use std::sync::Arc;
 use tests::{muprime, rounds};
 
+/// The plan; by default with half of its repeats.
+fn plan() -> Plan {
+    let (name, text) = runs::plan::BUNDLED.iter().find(|(name, _)| *name == "part2-validation").unwrap();
+    assert!(text.contains("\nreplicates = 8\n"));
+    Plan::parse(name, &text.replace("\nreplicates = 8\n", rounds("\nreplicates = 4\n", "\nreplicates = 8\n")))
+        .unwrap()
+}
+
 /// The verdict of a sweep of the plan on a bundled rig, with a defect where one is given.
 fn verdict(rig: &str, defect: Option<(&str, u64)>, seed: u64) -> serde_json::Value {
     let folder = tempfile::tempdir().unwrap();
@@ -21,7 +29,7 @@ fn verdict(rig: &str, defect: Option<(&str, u64)>, seed: u64) -> serde_json::Val
     let job = Job {
         model: Arc::new(SpringSlider::new(setup.tip.finger).unwrap()),
         setup,
-        plan: Plan::load("part2-validation").unwrap(),
+        plan: plan(),
         seed,
         model_file: None,
         defects: defect.map(|defect| Defects::parse(&text(defect)).unwrap()),

@@ -1,4 +1,4 @@
-//! Departures that no smooth map follows: sudden, periodic or local ones, in tables with and without scatter of other kinds.
+//! Departures that no smooth map follows: sudden, periodic or local ones. That scatter alone is none: tests/rough.rs.
 use diagnosis::Verdict;
 use diagnosis::data::{RigFile, Table};
 use diagnosis::hypotheses::Options;
@@ -11,14 +11,8 @@ use std::sync::Arc;
 
 /// A table without a cause in the order of measurement, to which so many deviations of a pass are added where
 /// a shape says so, against the motion.
-fn with(
-    seed: u64,
-    roughness: Roughness,
-    deviations: f64,
-    shape: &(dyn Fn(f64, &Pass) -> f64 + Sync),
-    options: &Options,
-) -> Report {
-    let set = rough(seed, None, roughness);
+fn with(seed: u64, deviations: f64, shape: &(dyn Fn(f64, &Pass) -> f64 + Sync), options: &Options) -> Report {
+    let set = rough(seed, None, Roughness::Gaussian);
     let rig = RigFile::parse(&set.rig_toml).unwrap();
     let mut passes = set.passes;
     passes.sort_by(|a, b| a.time_s.total_cmp(&b.time_s));
@@ -35,16 +29,18 @@ fn quick() -> Options {
     Options { pairs: false, ..Options::default() }
 }
 
+/// How many of the tables with a departure are a gap that nothing names.
 fn unknown(
     what: &str,
+    tables: u64,
     deviations: f64,
     shape: &(dyn Fn(f64, &Pass) -> f64 + Sync),
     options: &Options,
 ) -> usize {
-    (0..6u64)
+    (0..tables)
         .into_par_iter()
         .filter(|k| {
-            let report = with(880_000 + k, Roughness::Gaussian, deviations, shape, options);
+            let report = with(880_000 + k, deviations, shape, options);
             println!("{what} {k}: {:?} {} {:?}", report.verdict, report.text, report.remarks);
             assert_ne!(report.verdict, Verdict::Named, "{what}: {}", report.text);
             report.verdict == Verdict::Unknown
@@ -60,31 +56,21 @@ fn what_is_sudden_periodic_or_local_is_a_gap() {
     let period = |t: f64, _: &Pass| (2.0 * PI * t * 15.0).sin();
     let jumps = |t: f64, _: &Pass| if (t * 9.0).fract() < 0.5 { 0.5 } else { -0.5 };
     let spot = |_: f64, p: &Pass| f64::from(u8::from((0.008..0.0105).contains(&p.position_m)));
-    for (what, deviations, wanted, shape) in [
-        ("a spell", 2.5, 5, &spell as &(dyn Fn(f64, &Pass) -> f64 + Sync)),
-        ("a period", 1.4, 6, &period),
-        ("jumps to and fro", 2.4, 6, &jumps),
-        ("a spot", 3.0, 4, &spot),
+    // By default three tables where none or one of six may be missed.
+    let few = tests::rounds(3, 6);
+    for (what, deviations, tables, missed, shape) in [
+        ("a spell", 2.5, few, tests::rounds(0, 1), &spell as &(dyn Fn(f64, &Pass) -> f64 + Sync)),
+        ("a period", 1.4, few, 0, &period),
+        ("jumps to and fro", 2.4, few, 0, &jumps),
+        ("a spot", 3.0, 6, 2, &spot),
     ] {
-        let found = unknown(what, deviations, shape, &quick());
-        println!("{what}: {found} of 6");
-        assert!(found >= wanted, "{what}: {found} of 6");
+        let found = unknown(what, tables, deviations, shape, &quick());
+        println!("{what}: {found} of {tables}");
+        assert!(found + missed >= tables as usize, "{what}: {found} of {tables}");
     }
     // Without that part of the open set the smooth map alone sees none of the periods.
     let mut blind = quick();
     Arc::make_mut(&mut blind.constants).set("structure_share", "1e-12").unwrap();
-    let found = unknown("a period, smooth map alone", 1.4, &period, &blind);
+    let found = unknown("a period, smooth map alone", few, 1.4, &period, &blind);
     assert_eq!(found, 0);
-}
-
-/// Scatter of any kind has no structure.
-#[test]
-fn scatter_has_no_structure() {
-    for (name, kind) in Roughness::ALL {
-        let claimed = (0..tests::rounds(1, 8u64))
-            .into_par_iter()
-            .filter(|k| with(890_000 + k, kind, 0.0, &|_, _| 0.0, &quick()).verdict != Verdict::NoGap)
-            .count();
-        assert_eq!(claimed, 0, "{name}");
-    }
 }

@@ -63,7 +63,10 @@ fn order(levels: &[[f64; 3]], ratio: f64) -> Order {
 #[test]
 fn order_with_the_mesh() {
     let mut ratio = f64::NAN;
-    let cases = cases();
+    // By default four of the eight, each amplitude once: the finest mesh takes most of the time.
+    let all = std::env::var_os("MUPRIME_LONG").is_some();
+    let taken = cases().into_iter().enumerate().filter(|(i, _)| all || [0, 2, 5, 7].contains(i));
+    let cases: Vec<RidgeCase> = taken.map(|(_, case)| case).collect();
     let at = |case: &RidgeCase| {
         [200, 800, 3200].map(|elements| mu(&RidgeCase { elements, ..*case }, &RunSettings::default()))
     };

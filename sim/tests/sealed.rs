@@ -91,6 +91,10 @@ fn the_oracle_finds_the_imitators_that_are_known() {
             assert!(talk.share_left < 0.2, "{talk:?}");
             seen += 1;
         }
+        // Two of them are enough, unless all are wanted.
+        if seen == 2 && std::env::var_os("MUPRIME_LONG").is_none() {
+            break;
+        }
     }
     assert!(seen >= 2, "{seen}");
 }

@@ -11,7 +11,7 @@ use sim::defects::{Defects, Surroundings};
 use sim::finger::{Finger, FingerConfig};
 use sim::noise::Noise;
 use sim::world::{Point, steady_forces};
-use tests::{documents, muprime, texts};
+use tests::{documents, muprime, rounds, texts};
 
 /// Passes over loads and speeds with pass-to-pass scatter and force noise, as the rig would measure them.
 fn passes(finger: &Finger, defects: &Defects, draw: &mut Noise) -> Vec<FrictionPoint> {
@@ -95,7 +95,9 @@ fn a_contact_that_is_not_coulombic_is_seen() {
 /// about a degree and a half on each mean, as PHASES.csv has them.
 fn phases_csv() -> String {
     let mut text = String::from("amplitude_pp_m,phase_shift_deg,phase_shift_sd_deg,repeats,condition\n");
-    for (n, um) in [1.1, 1.3, 1.5, 1.8, 2.2, 2.6].into_iter().enumerate() {
+    // The model is run once an amplitude: by default two of them are measured twice.
+    let amplitudes_um = rounds([1.1, 1.4, 1.8, 2.4, 1.4, 1.8], [1.1, 1.3, 1.5, 1.8, 2.2, 2.6]);
+    for (n, um) in amplitudes_um.into_iter().enumerate() {
         let amplitude = PeakToPeak::from_metres(um * 1e-6);
         let case = RidgeCase { amplitude, speed_m_s: 0.0, elements: 800, ..RidgeCase::paper() };
         let settings = RunSettings { step_s: Some(4.5e-9), energy: false, ..RunSettings::default() };

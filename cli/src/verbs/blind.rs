@@ -1,13 +1,13 @@
 //! `muprime blind`: the diagnosis scored on sealed sets.
 
-mod studies;
+mod noise;
 
 use super::prelude::*;
-use ::studies::cases::kinds::blind::run as score_all;
-use ::studies::progress::Study;
-use ::studies::validation::blind::distance::by_cause;
-use ::studies::validation::blind::reliability::{diagram, identifiable};
-use ::studies::validation::blind::{Scored, Settings, confusion, figures};
+use studies::cases::kinds::blind::run as score_all;
+use studies::progress::Study;
+use studies::validation::blind::distance::by_cause;
+use studies::validation::blind::reliability::{diagram, identifiable};
+use studies::validation::blind::{Scored, Settings, confusion, figures};
 
 /// Score the diagnosis on sealed sets of the independent simulation.
 #[derive(Debug, clap::Args)]
@@ -20,20 +20,10 @@ pub struct Args {
     /// Write the sets to this folder (open and sealed parts apart) for other diagnosers; none is scored.
     #[arg(long, value_name = "DIR")]
     pub write: Option<std::path::PathBuf>,
-    /// Instead: how often the intervals of the size cover on sets of the library's own forms.
-    #[arg(long, conflicts_with_all = ["further", "write", "stratum"])]
-    pub same_form: bool,
-    /// Instead: designed next experiments against random ones.
-    #[arg(long, conflicts_with_all = ["write", "stratum"])]
-    pub further: bool,
     /// Instead: sets whose scatter is not what rig.toml states: gaussian, heavy, serial, gross, understated, runs, or all; so
     /// many of each truth (none, a squeeze film, friction that depends on load, an offset).
-    #[arg(long, value_name = "KIND", conflicts_with_all = ["further", "write", "same_form", "stratum"])]
+    #[arg(long, value_name = "KIND", conflicts_with_all = ["write", "stratum"])]
     pub noise: Option<String>,
-    /// Instead: the verdicts with each constant halved and doubled. `fit`, `decision` or a name restricts it.
-    #[arg(long, value_name = "WHICH", num_args = 0..=1, default_missing_value = "all", hide = true,
-          conflicts_with_all = ["further", "write", "same_form"])]
-    pub sensitivity: Option<String>,
     /// Instead: the table of constants, as docs/diagnosis/constants.md has it.
     #[arg(long, hide = true)]
     pub constants: bool,
@@ -57,7 +47,7 @@ pub fn run(args: Args, json: bool) -> miette::Result<ExitCode> {
                 out!("partial: {done} of {sets} sets are in {to}");
             }
         })?;
-        for set in ::studies::validation::blind::sets(args.of.seed, sets, stratum) {
+        for set in studies::validation::blind::sets(args.of.seed, sets, stratum) {
             let name = format!("{:06}", set.label.seed % 1_000_003);
             set.write(&folder.join("open").join(&name), &folder.join("sealed").join(&name))
                 .into_diagnostic()?;
@@ -69,18 +59,8 @@ pub fn run(args: Args, json: bool) -> miette::Result<ExitCode> {
         out!("{}", diagnosis::constants::markdown().trim_end());
         return Ok(ExitCode::SUCCESS);
     }
-    if args.same_form {
-        return studies::same_form(&args, json);
-    }
-    if args.further {
-        return studies::further(&args, json);
-    }
-    let options = args.of.options()?;
     if let Some(kind) = args.noise.as_deref() {
-        return studies::rough(&args, kind, &options, json);
-    }
-    if let Some(picked) = args.sensitivity.as_deref() {
-        return studies::sensitivity(&args, picked, stratum, &options, json);
+        return noise::run(&args, kind, json);
     }
     let (seed, sets) = (args.of.seed, args.sets);
     let study = Study::begin(sets as u64, "sets", move |scored: Vec<Scored>, done| {

@@ -4,11 +4,8 @@
 //! by [`score`], after the verdict stands. Every figure comes with its number of sets and an interval.
 
 pub mod distance;
-pub mod further;
 pub mod reliability;
 pub mod rough;
-pub mod same_form;
-pub mod sensitivity;
 
 use diagnosis::Verdict;
 use diagnosis::constants::Constants;
@@ -287,7 +284,8 @@ pub fn share(name: &'static str, target: &'static str, outcomes: Vec<bool>) -> F
     }
 }
 
-fn statistic<T: Copy>(
+/// A statistic with the interval of a bootstrap.
+pub fn statistic<T: Copy>(
     name: &'static str,
     target: &'static str,
     values: &[T],
@@ -323,7 +321,8 @@ fn mean(v: &mut [f64]) -> f64 {
     v.iter().sum::<f64>() / v.len() as f64
 }
 
-fn median(v: &mut [f64]) -> f64 {
+/// The median; sorts the values.
+pub fn median(v: &mut [f64]) -> f64 {
     v.sort_by(f64::total_cmp);
     0.5 * (v[(v.len() - 1) / 2] + v[v.len() / 2])
 }

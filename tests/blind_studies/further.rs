@@ -4,7 +4,6 @@
 //! once as the diagnosis asks for them and once at conditions drawn evenly from the grid that designs choose from, until
 //! the truth has a probability of 0.9 or the passes run out. Both sides meet the same stream of noise.
 
-use super::{Figure, median, share, statistic};
 use diagnosis::data::{RigFile, Table};
 use diagnosis::hypotheses::Options;
 use diagnosis::next;
@@ -16,6 +15,7 @@ use rayon::prelude::*;
 use serde::Serialize;
 use sim::noise::Noise;
 use sim::sealed::{Ask, Stratum, generate_with_rig};
+use studies::validation::blind::{Figure, median, share, statistic};
 
 /// Passes that a thinned set keeps: the most of these at which its cause is open. A sixth with the plate
 /// still. Most causes that the whole set identifies are plain from two dozen passes.
@@ -25,7 +25,7 @@ const SIZES: [usize; 5] = [48, 36, 24, 16, 12];
 const BATCH: usize = 2;
 const BATCHES: usize = 32;
 /// Passes at which a race is broken off: who has not arrived counts with so many.
-pub const LIMIT: usize = BATCH * BATCHES;
+const LIMIT: usize = BATCH * BATCHES;
 /// Probability at which a cause counts as found.
 const FOUND: f64 = 0.9;
 /// Probability below which a cause is open. Where it is likelier than not at the start, any further pass may end the race.
@@ -35,67 +35,69 @@ const SEPARATED: f64 = 100.0;
 
 /// The diagnosis after a batch.
 #[derive(Debug, Clone, Serialize)]
-pub struct Step {
+struct Step {
     /// Further passes so far.
-    pub passes: usize,
+    passes: usize,
     /// Probability of the truth.
-    pub truth: f64,
+    truth: f64,
     /// Probability of the open set.
-    pub unknown: f64,
+    unknown: f64,
     /// The likeliest hypothesis.
-    pub leader: String,
+    leader: String,
     /// Share of the gap that it closed on left-out regions.
-    pub closure: f64,
+    closure: f64,
 }
 
 /// What it took to name the cause of one set.
 #[derive(Debug, Clone, Serialize)]
-pub struct Race {
+struct Race {
     /// Seed of the set.
-    pub seed: u64,
+    seed: u64,
     /// The cause.
-    pub truth: String,
+    truth: String,
     /// Number of passes in the thinned set.
     #[serde(rename = "kept")]
-    pub passes: usize,
+    passes: usize,
     /// Probability of the truth before any further pass.
-    pub before: f64,
+    before: f64,
     /// Further passes as designed; none where they did not suffice.
-    pub designed: Option<usize>,
+    designed: Option<usize>,
     /// Further passes at random.
-    pub random: Option<usize>,
+    random: Option<usize>,
     /// Batch by batch as designed.
-    pub designed_steps: Vec<Step>,
+    designed_steps: Vec<Step>,
     /// Batch by batch at random.
-    pub random_steps: Vec<Step>,
+    random_steps: Vec<Step>,
 }
 
-/// Races over `count` sets, each passed to `each` as it ends; sets whose cause leads at first are left out.
-///
-/// # Errors
-/// A set that the diagnosis refuses.
-pub fn run(seed: u64, count: usize, each: &(dyn Fn(Option<&Race>) + Sync)) -> miette::Result<Vec<Race>> {
-    let all: miette::Result<Vec<Option<Race>>> = (0..count as u64)
+/// Races over `count` sets; sets whose cause leads at first are left out.
+pub fn run(seed: u64, count: u64) {
+    let races: Vec<Race> = (0..count)
         .into_par_iter()
-        .map(|k| {
-            let race = one(seed.wrapping_mul(1_000_003).wrapping_add(k))?;
-            each(race.as_ref());
-            Ok(race)
-        })
+        .filter_map(|k| one(seed.wrapping_mul(1_000_003).wrapping_add(k)).inspect(super::line))
         .collect();
-    Ok(all?.into_iter().flatten().collect())
+    println!("further passes to a probability of 0.9, {} sets whose cause is open at first:", races.len());
+    for f in figures(&races) {
+        let (value, [low, high]) = (f.value.unwrap_or(f64::NAN), f.ci95.unwrap_or([f64::NAN; 2]));
+        println!("  {:46} {value:7.3} [{low:.3}, {high:.3}]  n {}  {}", f.name, f.n, f.target);
+    }
+    let count = |of: &dyn Fn(usize, usize) -> bool| {
+        let passes = |n: Option<usize>| n.unwrap_or(usize::MAX);
+        races.iter().filter(|r| of(passes(r.designed), passes(r.random))).count()
+    };
+    println!("  designed sooner in {}, later in {}", count(&|d, r| d < r), count(&|d, r| d > r));
 }
 
-fn one(seed: u64) -> miette::Result<Option<Race>> {
+fn one(seed: u64) -> Option<Race> {
     let set = generate_with_rig(seed, Stratum::Single, Ask::Imitators).0;
     if set.label.chi2_gain < SEPARATED || !set.label.decidable() {
-        return Ok(None);
+        return None;
     }
     let truth = set.label.causes[0].name.clone();
-    let rig: RigFile = RigFile::parse(&set.rig_toml).map_err(|e| miette::miette!("rig.toml: {e}"))?;
-    let Some((size, start, first)) = thin(&set.passes, &rig, &truth)? else { return Ok(None) };
-    let grid = grid(&start)?;
-    let race = |designed: bool| -> miette::Result<Vec<Step>> {
+    let rig = RigFile::parse(&set.rig_toml).expect("rig.toml of a sealed set");
+    let (size, start, first) = thin(&set.passes, &rig, &truth)?;
+    let grid = grid(&start);
+    let race = |designed: bool| -> Vec<Step> {
         // Each side has the rig to itself: the same finger, the same stream of further noise.
         let mut sealed = generate_with_rig(seed, Stratum::Single, Ask::Gain).1;
         let mut chance = Noise::new(seed, "random experiments");
@@ -112,18 +114,18 @@ fn one(seed: u64) -> miette::Result<Option<Race>> {
                 pass.run = Some(format!("further {batch}"));
             }
             passes.extend(further);
-            let answer = says(&passes, &rig, &truth)?;
+            let answer = says(&passes, &rig, &truth);
             next = answer.next;
             steps.push(Step { passes: batch * BATCH, ..answer.step });
             if answer.found >= FOUND {
                 break;
             }
         }
-        Ok(steps)
+        steps
     };
-    let (designed_steps, random_steps) = (race(true)?, race(false)?);
+    let (designed_steps, random_steps) = (race(true), race(false));
     let arrived = |steps: &[Step]| steps.last().filter(|s| s.truth >= FOUND).map(|s| s.passes);
-    Ok(Some(Race {
+    Some(Race {
         seed,
         truth,
         passes: size,
@@ -132,11 +134,11 @@ fn one(seed: u64) -> miette::Result<Option<Race>> {
         random: arrived(&random_steps),
         designed_steps,
         random_steps,
-    }))
+    })
 }
 
 /// Figures of races: who arrived, and the ratio of passes where at least one side did.
-pub fn figures(races: &[Race]) -> Vec<Figure> {
+fn figures(races: &[Race]) -> Vec<Figure> {
     let passes = |n: Option<usize>| n.unwrap_or(LIMIT) as f64;
     let decided = races.iter().filter(|r| r.designed.is_some() || r.random.is_some());
     let both: Vec<[f64; 2]> = decided.map(|r| [passes(r.designed), passes(r.random)]).collect();
@@ -163,15 +165,15 @@ pub fn figures(races: &[Race]) -> Vec<Figure> {
 }
 
 /// The largest thinned set that does not identify its cause, with its diagnosis.
-fn thin(passes: &[Pass], rig: &RigFile, truth: &str) -> miette::Result<Option<(usize, Vec<Pass>, Answer)>> {
+fn thin(passes: &[Pass], rig: &RigFile, truth: &str) -> Option<(usize, Vec<Pass>, Answer)> {
     for size in SIZES {
         let start = thinned(passes, size);
-        let answer = says(&start, rig, truth)?;
+        let answer = says(&start, rig, truth);
         if answer.found < OPEN {
-            return Ok(Some((size, start, answer)));
+            return Some((size, start, answer));
         }
     }
-    Ok(None)
+    None
 }
 
 /// Every so many passes of a set, as if the sweep had been broken off.
@@ -198,9 +200,9 @@ struct Answer {
     next: Vec<Condition>,
 }
 
-fn says(passes: &[Pass], rig: &RigFile, truth: &str) -> miette::Result<Answer> {
+fn says(passes: &[Pass], rig: &RigFile, truth: &str) -> Answer {
     let options = Options { pairs: false, ..Options::default() };
-    let report = diagnose(&table(passes)?, rig, &options, String::new()).report;
+    let report = diagnose(&table(passes), rig, &options, String::new()).report;
     let of = |name: &str| -> f64 {
         report.hypotheses.iter().filter(|h| h.effects == [name]).map(|h| h.probability).sum()
     };
@@ -214,16 +216,16 @@ fn says(passes: &[Pass], rig: &RigFile, truth: &str) -> miette::Result<Answer> {
         leader: report.hypotheses[0].effects.join("+"),
         closure: report.left_out.pooled_closure,
     };
-    Ok(Answer { found, step, next })
+    Answer { found, step, next }
 }
 
-fn table(passes: &[Pass]) -> miette::Result<Table> {
-    Table::measured(passes).map_err(|e| miette::miette!("table of a sealed set: {e}"))
+fn table(passes: &[Pass]) -> Table {
+    Table::measured(passes).expect("a sealed table")
 }
 
 /// The conditions that a design of these passes may choose from.
-fn grid(passes: &[Pass]) -> miette::Result<Vec<Condition>> {
-    Ok(next::grid::conditions(&table(passes)?).iter().map(settings).collect())
+fn grid(passes: &[Pass]) -> Vec<Condition> {
+    next::grid::conditions(&table(passes)).iter().map(settings).collect()
 }
 
 /// What a plan sets of a condition, and nothing of its time and climate.

@@ -12,35 +12,43 @@ use rayon::prelude::*;
 use serde::Serialize;
 use sim::noise::Noise;
 use sim::sealed::{Ask, Stratum, generate};
+use studies::validation::blind::share;
 
 /// The size of the effect from one set.
 #[derive(Debug, Clone, Serialize)]
-pub struct Covered {
+struct Covered {
     /// Seed of the set.
-    pub seed: u64,
+    seed: u64,
     /// The effect and its law.
-    pub effect: &'static str,
+    effect: &'static str,
     /// The law.
-    pub law: &'static str,
+    law: &'static str,
     /// True size.
-    pub truth: f64,
+    truth: f64,
     /// Interval of the size; none where the effect was not named in its own law.
-    pub ci95: Option<[f64; 2]>,
+    ci95: Option<[f64; 2]>,
 }
 
 /// Makes and diagnoses `count` sets.
-///
-/// # Errors
-/// A set that the diagnosis refuses.
-pub fn run(seed: u64, count: usize, each: &(dyn Fn(&Covered) + Sync)) -> miette::Result<Vec<Covered>> {
+pub fn run(seed: u64, count: u64) {
     let own = |k| seed.wrapping_mul(1_000_003).wrapping_add(k);
-    (0..count as u64).into_par_iter().map(|k| Ok(one(own(k))?).inspect(each)).collect()
+    let sets: Vec<Covered> = (0..count).into_par_iter().map(|k| one(own(k))).inspect(super::line).collect();
+    let stated = sets.iter().filter_map(|s| Some((s.truth, s.ci95?)));
+    let covered = stated.map(|(truth, ci)| ci[0] <= truth && truth <= ci[1]).collect();
+    let figure = share("size inside its 95 % interval, same form", "0.92 to 0.98", covered);
+    println!(
+        "{}: {:.3} {:.3?}, n {} of {count} sets (the others were not named in their own form)",
+        figure.name,
+        figure.value.unwrap_or(f64::NAN),
+        figure.ci95.unwrap_or([f64::NAN; 2]),
+        figure.n,
+    );
 }
 
-fn one(seed: u64) -> miette::Result<Covered> {
+fn one(seed: u64) -> Covered {
     let set = generate(seed, Stratum::None, Ask::Gain);
-    let rig: RigFile = RigFile::parse(&set.rig_toml).map_err(|e| miette::miette!("rig.toml: {e}"))?;
-    let clean = Table::measured(&set.passes).map_err(|e| miette::miette!("table: {e}"))?;
+    let rig = RigFile::parse(&set.rig_toml).expect("rig.toml of a sealed set");
+    let clean = Table::measured(&set.passes).expect("a sealed table");
     let mut noise = Noise::new(seed, "same form");
     let seen: Vec<usize> = (0..library().len())
         .filter(|&i| {
@@ -87,18 +95,18 @@ fn one(seed: u64) -> miette::Result<Covered> {
         );
         own.normal_force_n += rig.noise.force_sd_n * noise.normal();
     }
-    let table = Table::measured(&passes).map_err(|e| miette::miette!("table: {e}"))?;
+    let table = Table::measured(&passes).expect("a sealed table");
     let options = Options { pairs: false, ..Options::default() };
     let result = diagnose(&table, &rig, &options, String::new());
     let first = &result.report.hypotheses[0];
     let own = result.report.verdict == Verdict::Named
         && first.effects == [effect.name]
         && first.laws == [form.name];
-    Ok(Covered {
+    Covered {
         seed,
         effect: effect.name,
         law: form.name,
         truth: theta[0],
         ci95: own.then(|| first.parameters[0].ci95),
-    })
+    }
 }
