@@ -1,8 +1,8 @@
 //! Every tunable constant of the diagnosis: name, value, meaning and source.
 //!
 //! A diagnosis takes its constants from [`Constants`]; the defaults are those of every verdict. A study may set one apart
-//! ([`Constants::set`], `muprime blind --constant NAME=VALUE`) or scale it ([`Constants::scale`], `--sensitivity`). The
-//! table of docs/diagnosis/constants.md is [`markdown`], held equal by a test.
+//! ([`Constants::set`], `muprime blind --constant NAME=VALUE`) or scale it ([`Constants::scale`], for
+//! docs/diagnosis/sensitivity.md). The table of docs/diagnosis/constants.md is [`markdown`], held equal by a test.
 //!
 //! What a source says: a reference to the literature; `contract` where docs/contract.md defines it; `numerical` where it
 //! is an accuracy or an effort; `development` where it was set on development sets, with what they showed; `judgement`
