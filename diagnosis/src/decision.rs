@@ -102,8 +102,8 @@ pub fn decide(fitted: &mut Fitted) -> Decision {
     Decision { verdict, none, unknown, probabilities, class, gate: judged, regions }
 }
 
-/// Probabilities with the chance that the method errs and does not see it: no probability of a truth is then
-/// 1e-40, and none that is stated beyond what verdicts on labelled sets have shown.
+/// Probabilities with the chance that the method errs and does not see it: none is then surer than verdicts on
+/// labelled sets have been right, and none is 1e-40.
 fn doubted(fitted: &Fitted, none: f64, unknown: f64, probabilities: &mut [f64]) -> (f64, f64) {
     let doubt = fitted.problem.constants.doubt;
     let (no_gap, open, each) = fitted.coarse();
@@ -280,6 +280,21 @@ mod tests {
             assert_eq!(result.saved_model().is_some(), wanted == Verdict::NoGap);
             assert!(result.predict(&table).iter().all(|f| f.corrected.is_finite() && f.corrected_sd > 0.0));
         }
+    }
+
+    /// Of a gap of several hundred nats the true cause is named, at no more than the method's doubt leaves, and
+    /// no cause is ruled out altogether.
+    #[test]
+    fn a_name_leaves_room_for_doubt() {
+        let table = table(&mut Deviates(5), 0.6);
+        let report = diagnose(&table, &rig(), &Options::default(), String::new()).report;
+        let of = |name: &str| report.hypotheses.iter().find(|h| h.effects == [name]).unwrap().probability;
+        assert_eq!(report.verdict, Verdict::Named, "{}", report.text);
+        assert!((0.9..0.9999).contains(&of("rate_dependent_friction")), "{}", report.text);
+        let least = report.hypotheses.iter().map(|h| h.probability).fold(1.0, f64::min);
+        assert!(least > 1e-30, "{least:e}");
+        let sum: f64 = report.hypotheses.iter().map(|h| h.probability).sum();
+        assert!((sum - 1.0).abs() < 1e-9, "{sum}");
     }
 
     /// Values at the ends of what a table may hold give an answer too.

@@ -112,8 +112,6 @@ impl Fitted {
     pub fn weigh(&mut self) {
         let k = self.problem.constants.clone();
         let [none, smooth] = self.evidence;
-        let count = self.tried.max(1) as f64;
-        let pair_count = (count * (count - 1.0) / 2.0).max(1.0);
         let beside = |evidence: f64| (evidence - none) / k.temper;
         // What the calibration says of the nuisances is a prior, and a prior is not tempered: a baseline that
         // needs a stiffness far from its certificate pays for that in full.
@@ -128,10 +126,8 @@ impl Fitted {
         let sudden = shapes::nats(&self.shapes) / k.temper;
         let parts = [(smooth, 1.0 - share), (rough, 0.5 * share), (sudden, 0.5 * share)];
         let open = log_sum_exp(&parts.map(|(nats, share)| nats + share.ln()));
-        let prior_of = |c: &Candidate| {
-            if c.effects.len() == 1 { k.prior_single / count } else { k.prior_pair / pair_count }
-        };
-        let mut all: Vec<f64> = self.candidates.iter().map(|c| weight(c) + prior_of(c).ln()).collect();
+        let mut all: Vec<f64> =
+            self.candidates.iter().map(|c| weight(c) + self.log_prior(c.effects.len())).collect();
         let (no_gap, unknown) = (k.prior_null.ln(), open + k.prior_open.ln());
         all.extend([no_gap, unknown]);
         let total = log_sum_exp(&all);
@@ -154,16 +150,28 @@ impl Fitted {
     pub(crate) fn coarse(&self) -> (f64, f64, Vec<f64>) {
         let k = &self.problem.constants;
         let [none, smooth] = self.evidence;
-        let count = self.tried.max(1) as f64;
-        let shares = [k.prior_single / count, 2.0 * k.prior_pair / (count * (count - 1.0)).max(2.0)];
-        let least = |evidence: f64| (evidence - none) / k.doubt_temper;
-        let mut all = vec![k.prior_null.ln(), k.prior_open.ln() + least(smooth)];
-        let own = self.candidates.iter();
-        all.extend(own.map(|c| shares[c.effects.len() - 1].ln() + least(c.log_evidence)));
+        let open = (smooth - none).max(shapes::nats(&self.shapes));
+        let mut all = vec![k.prior_null.ln(), k.prior_open.ln() + open / k.doubt_temper];
+        all.extend(
+            self.candidates
+                .iter()
+                .map(|c| self.log_prior(c.effects.len()) + (c.log_evidence - none) / k.doubt_temper),
+        );
         let total = log_sum_exp(&all);
         let mut all = all.into_iter().map(|v| (v - total).exp());
         let (no_gap, open) = (all.next().unwrap_or(0.0), all.next().unwrap_or(0.0));
         (no_gap, open, all.collect())
+    }
+
+    /// Logarithm of the prior probability of one hypothesis with so many effects.
+    fn log_prior(&self, effects: usize) -> f64 {
+        let k = &self.problem.constants;
+        let count = self.tried.max(1) as f64;
+        let prior = match effects {
+            1 => k.prior_single / count,
+            _ => k.prior_pair / (count * (count - 1.0) / 2.0).max(1.0),
+        };
+        prior.ln()
     }
 
     /// Log evidence of the best hypothesis.

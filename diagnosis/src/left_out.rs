@@ -281,6 +281,17 @@ mod tests {
     use super::*;
     use crate::example::{Deviates, rig, table};
 
+    /// Where true causes of a foreign form and mimics close as much, neither is ruled out; a cause that closes
+    /// nothing is, and one that closes nearly all stays.
+    #[test]
+    fn the_gate_is_open_where_causes_and_mimics_close_as_much() {
+        let k = Constants::default();
+        let survives = |pooled: f64| Gate { pooled, carrying: 6, closed: 5 }.survival(&k, k.form_shares[1]);
+        assert!((0.05..0.95).contains(&survives(0.45)) && (0.05..0.95).contains(&survives(0.65)));
+        assert!(survives(0.1) < 0.01 && survives(0.95) > 0.99);
+        assert!(Gate { pooled: 0.95, carrying: 6, closed: 2 }.survival(&k, k.form_shares[1]) <= 0.1);
+    }
+
     /// One vibrating pass, predicted from passes with the plate still, which tell nothing of the stiffnesses:
     /// a miss along them counts in deviations of scatter and of the stiffnesses' prior together.
     #[test]
