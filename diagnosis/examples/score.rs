@@ -167,7 +167,7 @@ fn score(folder: &Path, options: &Options, changes: &[Constants]) -> Result<Line
                     c.log_evidence - none,
                     fitted.problem.misfit(&b.prediction),
                     b.pull(),
-                    b.share,
+                    b.freedom.share + 10.0 * b.freedom.bend,
                 )
             })
             .collect(),

@@ -1,5 +1,6 @@
 //! Which: from probabilities to a verdict, with the causes that the data cannot separate.
 
+use crate::departure::Freedom;
 use crate::evidence::{Posterior, laplace};
 use crate::fitted::{Candidate, Fitted};
 use crate::left_out::{Gate, Region, gate, left_out_regions};
@@ -72,7 +73,7 @@ pub fn decide(fitted: &mut Fitted) -> Decision {
     let (k, candidates) = (&*fitted.problem.constants, &fitted.candidates);
     if claimed {
         // An effect that cannot predict what it has not seen is no cause: its weight goes to the open set.
-        let survival = judged.survival(k, candidates[leader].best.share);
+        let survival = judged.survival(k, candidates[leader].best.freedom.share);
         for p in &mut probabilities {
             unknown += *p * (1.0 - survival);
             *p *= survival;
@@ -127,7 +128,7 @@ fn judged(fitted: &mut Fitted, leader: usize, claimed: bool) -> (Vec<Region>, Ga
     let judge = |law: Posterior| {
         let regions = left_out_regions(fitted, &law);
         let gate = gate(&k, &regions);
-        (gate.survival(&k, law.share), law, regions, gate)
+        (gate.survival(&k, law.freedom.share), law, regions, gate)
     };
     let all = laws.into_iter().map(judge);
     let (_, law, regions, gate) =
@@ -162,7 +163,7 @@ fn departed_singles(fitted: &Fitted, leader: usize) -> Vec<usize> {
         return Vec::new();
     }
     let gap = left(fitted, &fitted.none);
-    let departs = own.best.share > k.form_shares[0];
+    let departs = own.best.freedom.share > k.form_shares[0];
     let might = |i: usize| {
         let behind = own.log_evidence - candidates[i].log_evidence;
         let most = match (departs, behind < k.pair_own_form_nats) {
@@ -181,16 +182,15 @@ fn departed_singles(fitted: &Fitted, leader: usize) -> Vec<usize> {
 /// chi2 beyond scatter that the best of a cause's laws leaves with a smooth departure of the largest share.
 fn left_by_a_form_of_its_own(fitted: &Fitted, cause: &Candidate) -> f64 {
     let problem = &fitted.problem;
-    let share = problem.constants.form_shares[2];
+    let freedom = Freedom::share(problem.constants.form_shares[2]);
     let laws = cause
         .laws
         .par_iter()
-        .map(|(_, law)| laplace(problem, &law.members, &law.u, &fitted.basis, share, OWN_FORM_ROUNDS));
+        .map(|(_, law)| laplace(problem, &law.members, &law.u, &fitted.basis, freedom, OWN_FORM_ROUNDS));
     let Some(best) = laws.max_by(|a, b| a.log_evidence.total_cmp(&b.log_evidence)) else {
         return f64::INFINITY;
     };
-    let departure = (&fitted.basis * &best.departure).component_mul(&best.change) * share;
-    problem.misfit(&(&best.prediction + departure)) - problem.len() as f64
+    problem.misfit(&(&best.prediction + best.departed(&fitted.basis))) - problem.len() as f64
 }
 
 /// chi2 that a model leaves beyond scatter.

@@ -7,7 +7,7 @@ use crate::constants::Constants;
 use crate::data::Table;
 use crate::fit::Problem;
 use crate::gaussian::{Covariance, Scaled, log_sum_exp};
-use crate::kernel::{Coordinates, Kernel, Lengths};
+use crate::kernel::{COUNT, Coordinates, Kernel, Lengths};
 use crate::layout::NUISANCES;
 use models::condition::Condition;
 use nalgebra::{DMatrix, DVector};
@@ -24,7 +24,7 @@ pub fn lengths(k: &Constants, table: &Table) -> Vec<Lengths> {
         time: k.discrepancy_time_lengths[i],
         position: k.discrepancy_position_lengths[i],
         climate: k.discrepancy_climate_lengths[i],
-        only: None,
+        seen: [true; COUNT],
     });
     let coordinates = Coordinates::of(table);
     let (sees, alone) = (coordinates.sees_climate(), k.discrepancy_lengths[0]);
@@ -33,7 +33,7 @@ pub fn lengths(k: &Constants, table: &Table) -> Vec<Lengths> {
         time: alone,
         position: alone,
         climate: f64::INFINITY,
-        only: Some(only),
+        seen: std::array::from_fn(|k| k == only),
     });
     all.filter(|l| sees || !l.climate.is_finite()).chain(each).collect()
 }

@@ -5,6 +5,7 @@
 //! The integral over the parameters is Laplace's, with the half-line of a size that cannot be negative.
 
 use crate::constants::Constants;
+use crate::departure::{Basis, Change, Freedom};
 use crate::fit::{Member, Problem};
 use crate::gaussian::{Covariance, log_sum_exp};
 use crate::layout::{Layout, NUISANCES};
@@ -34,21 +35,26 @@ pub struct Posterior {
     pub members: Vec<Member>,
     /// Coordinates.
     pub u: Vec<f64>,
-    /// Share of form uncertainty.
-    pub share: f64,
+    /// How far it may depart from its form.
+    pub freedom: Freedom,
     /// Log evidence.
     pub log_evidence: f64,
     /// Prediction of the form itself, N.
     pub prediction: DVector<f64>,
-    /// The effect's change net of recalibration, N.
-    pub change: DVector<f64>,
+    /// The effects' change net of recalibration, and what is bent.
+    pub change: Change,
     /// Posterior covariance of the coordinates.
     pub covariance: DMatrix<f64>,
-    /// Weights of the smooth departure from the form, on the form basis.
+    /// Weights of the departure from the form, on its columns ([`Change::columns`]).
     pub departure: DVector<f64>,
 }
 
 impl Posterior {
+    /// The departure from the form at the passes of the fit, N.
+    pub fn departed(&self, basis: &Basis) -> DVector<f64> {
+        self.change.columns(basis, self.freedom.share) * &self.departure
+    }
+
     /// chi2 by which mu0 and the stiffnesses are pulled from their calibration.
     pub fn pull(&self) -> f64 {
         self.u[..NUISANCES].iter().map(|x| x * x).sum()
@@ -84,41 +90,24 @@ pub fn recalibration(
     (raw, jacobian, shift)
 }
 
-fn form_matrix(change: &DVector<f64>, basis: &DMatrix<f64>, share: f64) -> DMatrix<f64> {
-    let mut phi = basis.clone();
-    for mut column in phi.column_iter_mut() {
-        column.component_mul_assign(change);
-        column.scale_mut(share);
-    }
-    phi
-}
-
-/// Improves a fit under the covariance of one share and gives its evidence. `members` may be empty (no gap):
+/// Improves a fit under the covariance of one freedom and gives its evidence. `members` may be empty (no gap):
 /// then there is no form uncertainty.
 pub fn laplace(
     problem: &Problem,
     members: &[Member],
     start: &[f64],
-    basis: &DMatrix<f64>,
-    share: f64,
+    basis: &Basis,
+    freedom: Freedom,
     rounds: usize,
 ) -> Posterior {
     let n = problem.len();
     let bounds = problem.bounds(members);
     let precision = problem.prior_precision(members);
-    let empty = DMatrix::zeros(n, 0);
     let mut u = start.to_vec();
     let mut m = problem.predict(members, &u);
     let y = DVector::from_column_slice(&problem.lateral);
-    let zero = DVector::zeros(n);
-    let mut change = if members.is_empty() { zero.clone() } else { net_change(problem, &u, &m) };
-    let build = |change: &DVector<f64>| {
-        if members.is_empty() {
-            problem.covariance(&empty)
-        } else {
-            problem.covariance(&form_matrix(change, basis, share))
-        }
-    };
+    let mut change = Change::by(problem, members, &u, &m, basis, freedom);
+    let build = |change: &Change| problem.covariance(&change.columns(basis, freedom.share));
     let penalty = |u: &[f64]| -> f64 { u.iter().zip(&precision).map(|(x, p)| p * x * x).sum() };
     let mut covariance = build(&change);
     let mut cost = covariance.quadratic(&(&y - &m)) + covariance.log_det() + penalty(&u);
@@ -132,7 +121,7 @@ pub fn laplace(
         for _ in 0..TRIALS {
             let Some(next) = bounded_step(&hessian, &gradient, damping, &u, &bounds) else { break };
             let there = problem.predict(members, &next);
-            let moved = if members.is_empty() { zero.clone() } else { net_change(problem, &next, &there) };
+            let moved = Change::by(problem, members, &next, &there, basis, freedom);
             let trial = build(&moved);
             let value = trial.quadratic(&(&y - &there)) + trial.log_det() + penalty(&next);
             if value < cost {
@@ -192,12 +181,12 @@ pub fn laplace(
             log_evidence += log_half_line(u[at] / sd, beyond);
         }
     }
-    let smooth = if members.is_empty() { 0 } else { basis.ncols() };
-    let departure = covariance.weights(&residual).rows(0, smooth).into_owned();
+    let columns = change.columns(basis, freedom.share).ncols();
+    let departure = covariance.weights(&residual).rows(0, columns).into_owned();
     Posterior {
         members: members.to_vec(),
         u,
-        share,
+        freedom,
         log_evidence,
         prediction: m,
         change,
@@ -242,45 +231,54 @@ fn largest_share(members: &[Member]) -> f64 {
     members.iter().map(Member::departs_by).fold(f64::INFINITY, f64::min)
 }
 
-/// Share of form uncertainty with which laws are compared before the others are tried.
-pub fn middle_form_share(k: &Constants, members: &[Member]) -> f64 {
-    k.form_shares[1].min(largest_share(members))
+/// Freedom with which laws are compared before the others are tried.
+pub fn middle_freedom(k: &Constants, members: &[Member]) -> Freedom {
+    Freedom::share(k.form_shares[1].min(largest_share(members)))
 }
 
-/// Evidence of a hypothesis averaged over the shares of form uncertainty, with the best share's solution.
+/// Evidence of a hypothesis averaged over its freedoms, with the best one's solution.
 pub fn averaged_over_form(
     problem: &Problem,
     fit: &Fit,
     members: &[Member],
-    basis: &DMatrix<f64>,
+    basis: &Basis,
 ) -> (f64, Posterior) {
     if members.is_empty() {
-        let e = laplace(problem, members, &fit.u, basis, 0.0, MODE_ROUNDS[0]);
+        let e = laplace(problem, members, &fit.u, basis, Freedom::NONE, MODE_ROUNDS[0]);
         return (e.log_evidence, e);
     }
     let most = largest_share(members);
     let k = &problem.constants;
     let [small, medium, large] = k.form_shares;
     let [first, second, third] = MODE_ROUNDS;
-    let middle = laplace(problem, members, &fit.u, basis, middle_form_share(k, members), second);
-    let mut list = vec![laplace(problem, members, &middle.u, basis, small, first)];
-    let high = (most >= large).then(|| laplace(problem, members, &middle.u, basis, large, third));
-    list.extend((most >= medium).then_some(middle));
-    list.extend(high);
-    let weights: f64 = k.form_weights[..list.len()].iter().sum();
-    let weighted: Vec<f64> =
-        list.iter().zip(k.form_weights).map(|(e, w)| e.log_evidence + (w / weights).ln()).collect();
+    let middle = laplace(problem, members, &fit.u, basis, middle_freedom(k, members), second);
+    let from = |freedom: Freedom, rounds: usize| laplace(problem, members, &middle.u, basis, freedom, rounds);
+    let [one, two, three] = k.form_weights;
+    let mut list = vec![(from(Freedom::share(small), first), one)];
+    if most >= large {
+        list.push((from(Freedom::share(large), third), three));
+    }
+    if basis.bends(members) {
+        let bent = Freedom { share: middle.freedom.share, bend: k.bend_share };
+        list.push((from(bent, second), k.bend_weight));
+    }
+    if most >= medium {
+        list.push((middle, two));
+    }
+    let weights: f64 = list.iter().map(|(_, w)| w).sum();
+    let weighted: Vec<f64> = list.iter().map(|(e, w)| e.log_evidence + (w / weights).ln()).collect();
     let total = log_sum_exp(&weighted);
     let best =
         (0..list.len()).max_by(|&a, &b| weighted[a].total_cmp(&weighted[b])).expect("at least one share");
-    (total, list.swap_remove(best))
+    (total, list.swap_remove(best).0)
 }
 
 #[cfg(test)]
 mod tests {
     use super::*;
     use crate::example::{Deviates, rig, table};
-    use crate::kernel::{Coordinates, Kernel, form_lengths};
+    use crate::departure::Kernels;
+    use crate::kernel::Coordinates;
     use crate::least_squares::minimise;
 
     /// Without a gap a law can gain no more than its best size does: at size zero its shapes change nothing,
@@ -290,16 +288,10 @@ mod tests {
         let table = table(&mut Deviates(11), 0.0);
         let mut problem = Problem::new(&table, &rig(), &Default::default());
         crate::noise::settle(&table, &rig(), &mut problem, &crate::scatter::Belief::Judged);
-        let coordinates = Coordinates::of(&table);
-        let largest = problem.design.largest_amplitude_m;
-        let places: Vec<_> = problem
-            .passes
-            .iter()
-            .map(|p| coordinates.place(p, largest, &form_lengths(&problem.constants)))
-            .collect();
-        let basis = Kernel::new(&places, 20, 0.02).matrix(&places);
+        let all: Vec<usize> = (0..effects::library().len()).collect();
+        let basis = Kernels::on(&problem, Coordinates::of(&table), &all).at(&problem.passes);
         let none = minimise(&problem, &[], &[0.0; NUISANCES], &problem.variance, 15);
-        let none = laplace(&problem, &[], &none.u, &basis, 0.0, 4);
+        let none = laplace(&problem, &[], &none.u, &basis, Freedom::NONE, 4);
         let mut tried = 0;
         for effect in 0..effects::library().len() {
             for law in 0..effects::library()[effect].laws.len() {
@@ -317,7 +309,9 @@ mod tests {
                             low
                         });
                     }
-                    let with = laplace(&problem, &[member], &u, &basis, problem.constants.form_shares[1], 0);
+                    let k = &problem.constants;
+                    let freedom = Freedom { share: k.form_shares[1], bend: k.bend_share };
+                    let with = laplace(&problem, &[member], &u, &basis, freedom, 0);
                     let gain = with.log_evidence - none.log_evidence;
                     let name = (effects::library()[effect].name, effects::library()[effect].laws[law].name);
                     assert!(gain.is_finite() && gain < 3.0, "{name:?}: {gain:.1} nats");

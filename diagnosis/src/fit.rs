@@ -6,7 +6,7 @@ use crate::gaussian::Covariance;
 use crate::law::Law;
 use crate::layout::{Layout, NUISANCES};
 pub use crate::member::Member;
-use effects::{Active, Baseline, Design, Parameter, library};
+use effects::{Active, Baseline, Design, Input, Parameter, library};
 use models::condition::Condition;
 use models::rig_file::CertifiedKey;
 use nalgebra::{DMatrix, DVector};
@@ -301,6 +301,18 @@ impl Problem {
 
     /// The spring-slider's forces, N.
     fn slider(&self, members: &[Member], u: &[f64], passes: &[Condition]) -> DVector<f64> {
+        let force = if self.rough { effects::rough_lateral_force } else { effects::lateral_force };
+        self.slider_by(members, u, passes, force)
+    }
+
+    /// The same by one way to compute a force.
+    fn slider_by(
+        &self,
+        members: &[Member],
+        u: &[f64],
+        passes: &[Condition],
+        force: impl Fn(&Baseline, &[Active<'_>], &Condition, &Design) -> f64,
+    ) -> DVector<f64> {
         let baseline = self.baseline(u);
         let thetas = self.thetas(members, u);
         // Effects act in the library's order, whatever the order of the hypothesis.
@@ -314,11 +326,21 @@ impl Problem {
                 theta: &thetas[k],
             })
             .collect();
-        let force = if self.rough { effects::rough_lateral_force } else { effects::lateral_force };
         DVector::from_iterator(
             passes.len(),
             passes.iter().map(|p| force(&baseline, &active, p, &self.design)),
         )
+    }
+
+    /// Change of the predictions for a unit of an input, as [`effects::Input`] has it, with the hypothesis in force.
+    pub fn sensitivity(&self, members: &[Member], u: &[f64], at: &DVector<f64>, input: Input) -> DVector<f64> {
+        let step = STEPS[1] * if input == Input::Load { self.design.reference_load_n } else { 1.0 };
+        let with = |b: &Baseline, a: &[Active<'_>], p: &Condition, d: &Design| {
+            effects::lateral_force_with(b, a, (input, step), p, d)
+        };
+        let mut there = self.slider_by(members, u, &self.passes, with);
+        there.iter_mut().zip(&self.beside).for_each(|(force, [beside, _])| *force += beside);
+        (there - at) / step
     }
 
     /// Derivatives of the predictions by the coordinates, by differences into the feasible side.

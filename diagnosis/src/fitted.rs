@@ -1,17 +1,16 @@
 //! Everything that was fitted to a table, and how probable each hypothesis is.
 
 use crate::data::RigFile;
+use crate::departure::{Basis, Kernels};
 use crate::discrepancy::Discrepancy;
 use crate::evidence::Posterior;
 use crate::fit::Problem;
 use crate::gaussian::log_sum_exp;
-use crate::kernel::{Coordinates, Kernel};
 use crate::layout::NUISANCES;
 use crate::noise::{PureError, variance};
 use crate::scatter::Scatter;
 use crate::structure::Structure;
 use crate::structure::shapes::{self, Shape};
-use nalgebra::DMatrix;
 
 /// One hypothesis with effects: its evidence over laws and shares, and its best law.
 #[derive(Clone)]
@@ -96,12 +95,10 @@ pub struct Fitted {
     pub candidates: Vec<Candidate>,
     /// Effects that this table cannot show, with what is missing.
     pub not_testable: Vec<(&'static str, String)>,
-    /// Covariates of the form uncertainty.
-    pub coordinates: Coordinates,
-    /// Kernel of the form uncertainty.
-    pub kernel: Kernel,
-    /// Its values at the table's passes.
-    pub basis: DMatrix<f64>,
+    /// Kernels of the departures from form.
+    pub kernels: Kernels,
+    /// Their values at the table's passes.
+    pub basis: Basis,
 }
 
 impl Fitted {

@@ -2,12 +2,13 @@
 
 use crate::constants::Constants;
 use crate::data::{RigFile, Table};
+use crate::departure::{Basis, Kernels};
 use crate::discrepancy::Discrepancy;
 use crate::evidence::{Posterior, averaged_over_form};
 use crate::fit::Problem;
 pub use crate::fitted::{Candidate, Fitted};
 use crate::gaussian::log_sum_exp;
-use crate::kernel::{Coordinates, Kernel, form_lengths};
+use crate::kernel::Coordinates;
 use crate::law::Law;
 use crate::layout::{Layout, NUISANCES};
 use crate::least_squares::minimise;
@@ -82,16 +83,9 @@ pub fn fit_believing(table: &Table, rig: &RigFile, options: &Options, belief: &B
     progress.at("the table's own scatter", 0.0);
     let mut problem = Problem::new(table, rig, &options.constants).on(options.law.as_ref());
     let (discrepancy, pure, scatter) = settle(table, rig, &mut problem, belief);
-    let coordinates = Coordinates::of(table);
-    let places: Vec<_> = problem
-        .passes
-        .iter()
-        .map(|p| coordinates.place(p, problem.design.largest_amplitude_m, &form_lengths(k)))
-        .collect();
-    let kernel = Kernel::new(&places, k.form_rank, k.kernel_rest);
-    let basis = kernel.matrix(&places);
 
     let baseline = minimise(&problem, &[], &[0.0; NUISANCES], &problem.variance, ROUNDS[0]);
+    let basis = Basis::none(problem.len());
     let (none_evidence, none) = averaged_over_form(&problem, &baseline, &[], &basis);
     let gap = &discrepancy.smooth - &none.prediction;
     let loose = tempered(&problem, &gap, k.start_share);
@@ -114,6 +108,9 @@ pub fn fit_believing(table: &Table, rig: &RigFile, options: &Options, belief: &B
     }
 
     problem.own = tried.iter().copied().filter(|e| options.own.contains(e)).collect();
+    let known: Vec<usize> = tried.iter().copied().chain(library().len()..effects::known().len()).collect();
+    let kernels = Kernels::on(&problem, Coordinates::of(table), &known);
+    let basis = kernels.at(&problem.passes);
     let search = Search { nuisances: &nuisances, loose: &loose, basis: &basis, progress };
     let mut candidates = singles(&problem, table, &tried, &search);
     let lapsed = lapsed(&mut problem, table, &mut candidates, &search);
@@ -127,8 +124,7 @@ pub fn fit_believing(table: &Table, rig: &RigFile, options: &Options, belief: &B
     progress.with("causes that the library does not name", SINGLES_END, || leading(&candidates));
     let leader = candidates.first().filter(|c| c.log_evidence > none_evidence + k.pairs_from_nats);
     if let (Belief::Judged, Some(leader)) = (belief, leader) {
-        let departed =
-            leader.best.change.component_mul(&(&basis * &leader.best.departure)) * leader.best.share;
+        let departed = leader.best.departed(&basis);
         if let Some(other) = scatter.about_cause(&problem, &(&leader.best.prediction + departed)) {
             return fit_believing(table, rig, options, &other);
         }
@@ -164,8 +160,7 @@ pub fn fit_believing(table: &Table, rig: &RigFile, options: &Options, belief: &B
         tried: tried.len(),
         candidates,
         not_testable,
-        coordinates,
-        kernel,
+        kernels,
         basis,
     };
     fitted.weigh();

@@ -1,11 +1,12 @@
 //! Parameter intervals by profile likelihood, with their shape.
 
+use crate::departure::Basis;
 use crate::evidence::Posterior;
 use crate::fit::Problem;
 use crate::gaussian::Covariance;
 use crate::layout::{Layout, NUISANCES};
 use crate::least_squares::bounded_step;
-use nalgebra::{DMatrix, DVector};
+use nalgebra::DVector;
 use serde::Serialize;
 
 /// Shape of a profile.
@@ -43,13 +44,8 @@ const FALL: f64 = 3.841;
 const NORMAL_95: f64 = 1.96;
 
 /// Profiles every parameter of the hypothesis.
-pub fn estimates(problem: &Problem, best: &Posterior, basis: &DMatrix<f64>) -> Vec<Vec<Estimate>> {
-    let mut phi = basis.clone();
-    for mut column in phi.column_iter_mut() {
-        column.component_mul_assign(&best.change);
-        column.scale_mut(best.share);
-    }
-    let covariance = problem.covariance(&phi);
+pub fn estimates(problem: &Problem, best: &Posterior, basis: &Basis) -> Vec<Vec<Estimate>> {
+    let covariance = problem.covariance(&best.change.columns(basis, best.freedom.share));
     let floor = cost(problem, best, &covariance, &best.u, &best.prediction);
     let precision = problem.prior_precision(&best.members);
     best.members

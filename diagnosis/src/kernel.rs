@@ -18,13 +18,13 @@ pub struct Lengths {
     pub position: f64,
     /// Temperature and humidity.
     pub climate: f64,
-    /// The one covariate that is seen, where not all are.
-    pub only: Option<usize>,
+    /// Which covariates are seen at all.
+    pub seen: [bool; COUNT],
 }
 
 impl Lengths {
     fn of(&self, covariate: usize) -> f64 {
-        if self.only.is_some_and(|only| only != covariate) {
+        if !self.seen[covariate] {
             return f64::INFINITY;
         }
         match SMOOTH[covariate].role {
@@ -40,7 +40,7 @@ impl Lengths {
 /// place.
 pub fn form_lengths(k: &Constants) -> Lengths {
     let far = f64::INFINITY;
-    Lengths { condition: k.form_length, time: k.form_length, position: far, climate: far, only: None }
+    Lengths { condition: k.form_length, time: k.form_length, position: far, climate: far, seen: [true; COUNT] }
 }
 
 /// Standardised covariates of passes.
@@ -54,7 +54,7 @@ pub struct Coordinates {
 /// Deviations of a covariate beyond which a place counts as the edge of the design.
 const EDGE_SD: f64 = 4.0;
 /// Number of covariates.
-const COUNT: usize = SMOOTH.len();
+pub(crate) const COUNT: usize = SMOOTH.len();
 /// Temperature or humidity of which time explains more than this share of the deviation is time by another
 /// name.
 const OF_ITS_OWN: f64 = 0.5;

@@ -1,7 +1,8 @@
 //! The gap left on parts of the operating space that the fit did not see.
 
 use crate::constants::Constants;
-use crate::evidence::{Posterior, net_change};
+use crate::departure::Freedom;
+use crate::evidence::{Posterior, laplace, net_change, recalibration};
 use crate::fit::{Member, Problem};
 use crate::fitted::Fitted;
 use crate::gaussian::Covariance;
@@ -122,6 +123,23 @@ fn left_out(rest: &Problem, out: &Problem, members: &[Member], start: &[f64]) ->
     (DVector::from_column_slice(&out.lateral) - expected, refit)
 }
 
+/// The same of a cause whose function of few covariates is bent: what the rest shows of the function is part of the mechanism.
+fn left_out_bent(
+    fitted: &Fitted,
+    best: &Posterior,
+    rest: &Problem,
+    out: &Problem,
+    rows: [&[usize]; 2],
+) -> DVector<f64> {
+    let freedom = Freedom { share: 0.0, ..best.freedom };
+    let [others, rows] = rows;
+    let refit = laplace(rest, &best.members, &best.u, &fitted.basis.select(others), freedom, ROUNDS);
+    let shift = recalibration(rest, &refit.u, &refit.prediction).2;
+    let columns = refit.change.at(out, &best.members, &refit.u, &shift).columns(&fitted.basis.select(rows), 0.0);
+    let expected = out.predict(&best.members, &refit.u) + columns * &refit.departure;
+    DVector::from_column_slice(&out.lateral) - expected
+}
+
 /// Covariance of a region's passes: scatter, and what the rest leaves open of the baseline.
 ///
 /// Stiffnesses that the rest does not tell carry baseline and hypothesis off together where they begin to
@@ -162,7 +180,7 @@ fn tells_nothing(problem: &Problem, rest: &Problem, best: &Posterior) -> bool {
         change.iter().zip(&p.variance).map(|(c, v)| c * c / v).sum()
     };
     let there = net_change(rest, &best.u, &rest.predict(&best.members, &best.u));
-    chi2(rest, &there) < problem.constants.informed_share * chi2(problem, &best.change)
+    chi2(rest, &there) < problem.constants.informed_share * chi2(problem, &best.change.net)
 }
 
 /// All other rows.
@@ -207,7 +225,11 @@ pub fn left_out_regions(fitted: &Fitted, best: &Posterior) -> Vec<Region> {
                 seen > k.informed_share * change.iter().sum::<f64>()
             });
             let (rest, out) = (problem.select(&others), problem.select(&rows));
-            let (hypothesis, _) = left_out(&rest, &out, &best.members, &best.u);
+            let hypothesis = if best.freedom.bend > 0.0 {
+                left_out_bent(fitted, best, &rest, &out, [&others, &rows])
+            } else {
+                left_out(&rest, &out, &best.members, &best.u).0
+            };
             let (baseline, refit) = left_out(&rest, &out, &[], &fitted.none.u);
             let metric = metric(&rest, &out, &refit);
             let n = out.len();

@@ -46,6 +46,7 @@
 pub mod certificates;
 pub mod constants;
 pub mod data;
+pub mod departure;
 pub mod decision;
 pub mod describe;
 pub mod discrepancy;

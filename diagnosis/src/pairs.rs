@@ -1,13 +1,13 @@
 //! Two causes at once: pairs grown from the best singles, and sought again in every law where they look best.
 
-use crate::evidence::{Posterior, averaged_over_form, laplace, middle_form_share};
+use crate::departure::Basis;
+use crate::evidence::{Posterior, averaged_over_form, laplace, middle_freedom};
 use crate::fit::{Member, Problem};
 use crate::fitted::Candidate;
 use crate::layout::{Layout, NUISANCES};
 use crate::least_squares::Fit;
 use crate::starts::{coarse_scan, full_scan, nuisance_starts, refine_from};
 use effects::one_cause;
-use nalgebra::DMatrix;
 use rayon::prelude::*;
 use std::collections::BTreeSet;
 
@@ -60,7 +60,7 @@ fn one_change(problem: &Problem, a: &Posterior, b: &Posterior) -> bool {
         return true;
     }
     let product = |x: &Posterior, y: &Posterior| -> f64 {
-        x.change.iter().zip(y.change.iter()).zip(&problem.variance).map(|((p, q), v)| p * q / v).sum()
+        x.change.net.iter().zip(y.change.net.iter()).zip(&problem.variance).map(|((p, q), v)| p * q / v).sum()
     };
     product(a, b) > problem.constants.one_change_cosine * (product(a, a) * product(b, b)).sqrt().max(1e-300)
 }
@@ -72,7 +72,7 @@ fn with_every_law(
     mut pairs: Vec<Pair>,
     singles: &[Candidate],
     loose: &[f64],
-    basis: &DMatrix<f64>,
+    basis: &Basis,
 ) -> Vec<Pair> {
     let evidence = |p: &Pair| p.posterior.log_evidence;
     pairs.sort_by(|a, b| evidence(b).total_cmp(&evidence(a)).then(a.effects.cmp(&b.effects)));
@@ -147,11 +147,11 @@ fn law_starts(
 }
 
 /// The mode of a pair from one start.
-fn refined(problem: &Problem, start: Start, loose: &[f64], basis: &DMatrix<f64>) -> Option<Posterior> {
+fn refined(problem: &Problem, start: Start, loose: &[f64], basis: &Basis) -> Option<Posterior> {
     let members = &start.members;
     let fit = refine_from(problem, members, start.u, loose)?;
-    let share = middle_form_share(&problem.constants, members);
-    Some(laplace(problem, members, &fit.u, basis, share, ROUNDS[0]))
+    let freedom = middle_freedom(&problem.constants, members);
+    Some(laplace(problem, members, &fit.u, basis, freedom, ROUNDS[0]))
 }
 
 /// The same pair with the exact alias of one of its members in its place.
@@ -217,7 +217,7 @@ pub fn pairs(
     problem: &Problem,
     singles: &[Candidate],
     loose: &[f64],
-    basis: &DMatrix<f64>,
+    basis: &Basis,
 ) -> Vec<Candidate> {
     let k = &problem.constants;
     let first: Vec<Pair> = coarse_starts(problem, singles, loose)
@@ -235,8 +235,8 @@ pub fn pairs(
         .par_iter()
         .flat_map_iter(|pair| twins(problem, &pair.posterior))
         .map(|(members, u)| {
-            let share = middle_form_share(k, &members);
-            Pair::of(laplace(problem, &members, &u, basis, share, ROUNDS[1]))
+            let freedom = middle_freedom(k, &members);
+            Pair::of(laplace(problem, &members, &u, basis, freedom, ROUNDS[1]))
         })
         .collect();
     found.extend(twins);
@@ -244,7 +244,7 @@ pub fn pairs(
 }
 
 /// Each pair with its evidence over the shares of form uncertainty, in its best two laws.
-fn weighed(problem: &Problem, pairs: Vec<Pair>, basis: &DMatrix<f64>) -> Vec<Candidate> {
+fn weighed(problem: &Problem, pairs: Vec<Pair>, basis: &Basis) -> Vec<Candidate> {
     let k = &problem.constants;
     let top = pairs.iter().map(|p| p.posterior.log_evidence).fold(f64::NEG_INFINITY, f64::max);
     let weighed: Vec<(Vec<usize>, f64, Posterior)> = pairs

@@ -2,11 +2,11 @@
 
 use crate::data::{RigFile, Table};
 use crate::decision::Verdict;
+use crate::departure::Freedom;
 use crate::discrepancy::{Discrepancy, lengths};
 use crate::evidence::{Posterior, laplace, recalibration};
 use crate::fit::Problem;
 use crate::fitted::Fitted;
-use crate::kernel::form_lengths;
 use crate::layout::NUISANCES;
 use crate::least_squares::minimise;
 use models::condition::Condition;
@@ -52,12 +52,12 @@ pub fn model(
     let rows = rows.unwrap_or(&all);
     let whole = rows.len() == fitted.problem.len();
     let problem = fitted.problem.select(rows);
-    let basis = fitted.basis.select_rows(rows.iter());
+    let basis = fitted.basis.select(rows);
     let baseline = if whole {
         fitted.none.clone()
     } else {
         let fit = minimise(&problem, &[], &fitted.none.u, &problem.variance, ROUNDS[0]);
-        laplace(&problem, &[], &fit.u, &basis, 0.0, ROUNDS[1])
+        laplace(&problem, &[], &fit.u, &basis, Freedom::NONE, ROUNDS[1])
     };
     let model = match (verdict, leader) {
         (Verdict::NoGap, _) => Model::Baseline(baseline.clone()),
@@ -66,7 +66,7 @@ pub fn model(
             Model::Effects(if whole {
                 best.clone()
             } else {
-                laplace(&problem, &best.members, &best.u, &basis, best.share, ROUNDS[2])
+                laplace(&problem, &best.members, &best.u, &basis, best.freedom, ROUNDS[2])
             })
         }
         (Verdict::Unknown, _) | (_, None) => {
@@ -137,27 +137,14 @@ fn forecast_part(
         }
         Ready::Effects { best: e, shift, departure } => {
             let plain = out.predict(&e.members, &e.u);
-            let places: Vec<_> = passes
-                .iter()
-                .map(|p| {
-                    fitted.coordinates.place(
-                        p,
-                        out.design.largest_amplitude_m,
-                        &form_lengths(&problem.constants),
-                    )
-                })
-                .collect();
-            let basis = fitted.kernel.matrix(&places);
-            let under = out.predict(&[], &e.u[..NUISANCES]);
-            let change = &plain - &under - out.jacobian(&[], &e.u[..NUISANCES], &under) * shift;
-            let delta = &basis * &e.departure * e.share;
+            let change = e.change.at(&out, &e.members, &e.u, shift);
+            let columns = change.columns(&fitted.kernels.at(passes), e.freedom.share);
             let mut spread = parameter_variance(&out, e, &plain);
-            let open = &basis * departure;
+            let open = &columns * departure;
             for i in 0..n {
-                let left = open.row(i).dot(&basis.row(i)).max(0.0);
-                spread[i] += (e.share * change[i]).powi(2) * left;
+                spread[i] += open.row(i).dot(&columns.row(i)).max(0.0);
             }
-            (plain.clone(), plain + change.component_mul(&delta), spread)
+            (plain.clone(), plain + columns * &e.departure, spread)
         }
         Ready::Open(w) => {
             let (mean, sd) = w.predict(problem, passes);
@@ -187,18 +174,8 @@ fn parameter_variance(out: &Problem, e: &Posterior, at: &DVector<f64>) -> Vec<f6
 
 /// Posterior covariance of the departure's weights.
 fn departure_covariance(fitted: &Fitted, problem: &Problem, e: &Posterior) -> DMatrix<f64> {
-    let r = fitted.kernel.rank();
-    let places: Vec<_> = problem
-        .passes
-        .iter()
-        .map(|p| {
-            fitted.coordinates.place(p, problem.design.largest_amplitude_m, &form_lengths(&problem.constants))
-        })
-        .collect();
-    let mut phi = fitted.kernel.matrix(&places);
-    for (mut row, change) in phi.row_iter_mut().zip(e.change.iter()) {
-        row.scale_mut(e.share * change);
-    }
+    let phi = e.change.columns(&fitted.kernels.at(&problem.passes), e.freedom.share);
+    let r = phi.ncols();
     let gram =
         problem.covariance(&DMatrix::zeros(problem.len(), 0)).inner(&phi, &phi) + DMatrix::identity(r, r);
     gram.cholesky().map_or_else(|| DMatrix::identity(r, r), |c| c.inverse())

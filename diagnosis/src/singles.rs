@@ -1,7 +1,8 @@
 //! One effect at a time: every law sought from global starts, and the laws of an effect put together.
 
 use crate::data::Table;
-use crate::evidence::{Posterior, averaged_over_form, laplace, middle_form_share};
+use crate::departure::Basis;
+use crate::evidence::{Posterior, averaged_over_form, laplace, middle_freedom};
 use crate::fit::{Member, Problem};
 use crate::fitted::Candidate;
 use crate::gaussian::log_sum_exp;
@@ -9,7 +10,6 @@ use crate::least_squares::Fit;
 use crate::progress::Progress;
 use crate::starts::{REFINED_ROWS, Sought, nuisance_starts, seek};
 use effects::{known, library};
-use nalgebra::DMatrix;
 use rayon::prelude::*;
 use std::sync::atomic::{AtomicUsize, Ordering};
 
@@ -29,7 +29,7 @@ const OUTRUN: f64 = 2.0;
 pub(crate) struct Search<'a> {
     pub nuisances: &'a [f64],
     pub loose: &'a [f64],
-    pub basis: &'a DMatrix<f64>,
+    pub basis: &'a Basis,
     /// Receives the progress of the search.
     pub progress: &'a Progress,
 }
@@ -149,7 +149,7 @@ fn each_law(problem: &Problem, members: &[Member], search: &Search<'_>) -> Vec<O
                 .filter(|f| rounds > 0 || f.cost == own)
                 .filter(|f| f.cost < NEAR_OPTIMA.0 * own + NEAR_OPTIMA.1)
                 .map(|f| {
-                    laplace(problem, &[*member], &f.u, search.basis, middle_form_share(k, &[*member]), rounds)
+                    laplace(problem, &[*member], &f.u, search.basis, middle_freedom(k, &[*member]), rounds)
                 })
                 .max_by(|a, b| a.log_evidence.total_cmp(&b.log_evidence))
         })

@@ -110,9 +110,7 @@ mod tests {
     use crate::decision::decide;
     use crate::evidence::{Posterior, laplace};
     use crate::example::{Deviates, rig, table};
-    use crate::fit::Problem;
     use crate::hypotheses::{Fitted, Options, fit_all};
-    use crate::kernel::form_lengths;
     use crate::next::{PASSES, grid, predictive::predictives};
     use models::condition::Condition;
 
@@ -125,14 +123,8 @@ mod tests {
             problem.variance.push(*variance);
         }
         problem.common = problem.common.resize_vertically(problem.passes.len(), 0.0);
-        let largest = problem.design.largest_amplitude_m;
-        let places: Vec<_> = problem
-            .passes
-            .iter()
-            .map(|p| fitted.coordinates.place(p, largest, &form_lengths(&problem.constants)))
-            .collect();
-        let problem: Problem = problem;
-        laplace(&problem, &e.members, &e.u, &fitted.kernel.matrix(&places), e.share, 8).log_evidence
+        let basis = fitted.kernels.at(&problem.passes);
+        laplace(&problem, &e.members, &e.u, &basis, e.freedom, 8).log_evidence
     }
 
     /// The stated nats are what evidence gains on average when the passes are made and the leader is true.

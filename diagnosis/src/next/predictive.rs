@@ -6,11 +6,10 @@
 
 use crate::data::RigFile;
 use crate::decision::Decision;
+use crate::departure::Basis;
 use crate::evidence::{Posterior, recalibration};
 use crate::fit::Problem;
 use crate::fitted::Fitted;
-use crate::kernel::form_lengths;
-use crate::layout::NUISANCES;
 use models::condition::Condition;
 use nalgebra::{DMatrix, DVector};
 use rayon::prelude::*;
@@ -38,11 +37,7 @@ pub fn predictives(
 ) -> Vec<Predictive> {
     let k = &fitted.problem.constants;
     let problem = fitted.problem.at(grid);
-    let places: Vec<_> = grid
-        .iter()
-        .map(|p| fitted.coordinates.place(p, problem.design.largest_amplitude_m, &form_lengths(k)))
-        .collect();
-    let basis = fitted.kernel.matrix(&places);
+    let basis = fitted.kernels.at(grid);
     let mut order: Vec<usize> = (0..fitted.candidates.len()).collect();
     order.sort_by(|&a, &b| decision.probabilities[b].total_cmp(&decision.probabilities[a]).then(a.cmp(&b)));
     if let Some(leader) = decision.leader() {
@@ -91,7 +86,7 @@ pub fn predictives(
 fn expected(
     fitted: &Fitted,
     grid: &Problem,
-    basis: &DMatrix<f64>,
+    basis: &Basis,
     e: &Posterior,
 ) -> (DVector<f64>, DMatrix<f64>) {
     let problem = &fitted.problem;
@@ -99,18 +94,16 @@ fn expected(
     let here = grid.jacobian(&e.members, &e.u, &plain);
     let there = problem.jacobian(&e.members, &e.u, &e.prediction);
     let d = e.u.len();
-    let r = if e.departure.is_empty() { 0 } else { basis.ncols() };
+    let r = e.departure.len();
     let (mut seen, mut planned) = (there.insert_columns(d, r, 0.0), here.insert_columns(d, r, 0.0));
     let mut mean = plain.clone();
     if r > 0 {
         let (_, _, shift) = recalibration(problem, &e.u, &e.prediction);
-        let under = grid.predict(&[], &e.u[..NUISANCES]);
-        let change = &plain - &under - grid.jacobian(&[], &e.u[..NUISANCES], &under) * shift;
-        mean += change.component_mul(&(basis * &e.departure)) * e.share;
-        for k in 0..r {
-            seen.set_column(d + k, &(fitted.basis.column(k).component_mul(&e.change) * e.share));
-            planned.set_column(d + k, &(basis.column(k).component_mul(&change) * e.share));
-        }
+        let columns =
+            e.change.at(grid, &e.members, &e.u, &shift).columns(basis, e.freedom.share);
+        mean += &columns * &e.departure;
+        seen.columns_mut(d, r).copy_from(&e.change.columns(&fitted.basis, e.freedom.share));
+        planned.columns_mut(d, r).copy_from(&columns);
     }
     let mut precision = problem.covariance(&DMatrix::zeros(problem.len(), 0)).inner(&seen, &seen);
     for (k, p) in problem.prior_precision(&e.members).iter().enumerate() {

@@ -10,13 +10,14 @@ use crate::fit::Problem;
 use crate::gaussian::{Covariance, log_sum_exp};
 use crate::layout::NUISANCES;
 use crate::scatter::Scatter;
+use effects::Input;
 use models::covariate::{COVARIATES, Covariate, Role};
 use nalgebra::{DMatrix, DVector};
 use rayon::prelude::*;
 use std::f64::consts::PI;
 
 /// Deviations of a shape's size, in units of full friction.
-const SIZES: [f64; 3] = [0.02, 0.06, 0.2];
+const SIZES: [f64; 4] = [0.02, 0.06, 0.2, 0.6];
 /// Scales of independent scatter where none is to last.
 const SCALES: [f64; 4] = [1.0, 1.3, 1.7, 2.2];
 /// Places of a jump, and of a bump; its widths as shares of the range.
@@ -92,7 +93,7 @@ pub fn shapes(problem: &Problem, none: &Posterior, scatter: &Scatter) -> Vec<Sha
     let residual = DVector::from_column_slice(&part.lateral) - &prediction + &jacobian * nuisance;
     let grounds = grounds(&part, &jacobian, &residual, scatter.lasting_columns(problem), scatter.slow_cost);
     let mut list: Vec<Shape> =
-        families(&part, &prediction).par_iter().map(|family| weighed(family, &grounds, &residual)).collect();
+        families(&part, &none.u, &prediction).par_iter().map(|family| weighed(family, &grounds, &residual)).collect();
     list.sort_by(|a, b| b.nats.total_cmp(&a.nats));
     list
 }
@@ -180,7 +181,7 @@ fn weighed(family: &Family, grounds: &[Ground], residual: &DVector<f64>) -> Shap
     }
 }
 
-fn families(part: &Problem, prediction: &DVector<f64>) -> Vec<Family> {
+fn families(part: &Problem, u: &[f64], prediction: &DVector<f64>) -> Vec<Family> {
     let full = part.full_friction();
     let mean = full.iter().sum::<f64>() / full.len() as f64;
     let friction: Vec<f64> = (0..part.len())
@@ -190,7 +191,21 @@ fn families(part: &Problem, prediction: &DVector<f64>) -> Vec<Family> {
         ((0..full.len()).map(|i| f(i).powi(2)).sum::<f64>() / full.len() as f64).sqrt()
     };
     let both = part.passes.iter().any(|p| p.direction != part.passes[0].direction);
-    let mut signals = vec![(true, friction.clone(), rms(&|i| friction[i] / full[i]))];
+    // What a change of the friction coefficient or of the amplitude does is not in proportion to the force.
+    let slope = |input: Input| {
+        let slope = part.sensitivity(&[], u, prediction, input);
+        let size = rms(&|i| slope[i] / full[i]).max(1e-9);
+        let level = rms(&|i| friction[i] / full[i]);
+        (0..part.len()).map(|i| slope[i] * level / size).collect::<Vec<f64>>()
+    };
+    let inputs = [slope(Input::Friction), slope(Input::Amplitude), friction];
+    let mut signals: Vec<(bool, Vec<f64>, f64)> = inputs
+        .into_iter()
+        .map(|signal| {
+            let unit = rms(&|i| signal[i] / full[i]);
+            (true, signal, unit)
+        })
+        .collect();
     if both {
         signals.push((false, vec![mean; full.len()], rms(&|i| mean / full[i])));
     }

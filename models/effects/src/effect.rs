@@ -168,6 +168,37 @@ impl Parameter {
     }
 }
 
+/// What a cause acts on, and what its size there may be a function of.
+///
+/// The library's laws are formulae; of many causes a rig knows only this much. A departure that bends what the cause acts on,
+/// over these covariates and no others, keeps the mechanism where the formula fails.
+#[derive(Debug, Clone, Copy)]
+pub struct Acts {
+    /// What it acts on.
+    pub on: Input,
+    /// Covariates that its size depends on.
+    pub over: &'static [&'static Covariate],
+}
+
+/// An input of the contact or of the reading.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum Input {
+    /// Amplitude of the plate, in e-folds.
+    Amplitude,
+    /// Speed of sliding, in e-folds.
+    Speed,
+    /// Normal and lateral stiffness together, in e-folds.
+    Stiffness,
+    /// Friction coefficient, in e-folds.
+    Friction,
+    /// Load on the contact, N.
+    Load,
+    /// Lateral force read without load, N.
+    Offset,
+    /// Lateral force read per newton of normal force.
+    Crosstalk,
+}
+
 /// How a law acts as a change of the baseline, exactly and on every pass: by e-folds of mu0, normal and
 /// lateral stiffness for one e-fold of the law's size.
 pub type Rescaling = [f64; 3];
@@ -334,6 +365,9 @@ pub struct Effect {
     /// plate looks like a cross-talk that is off by a third).
     #[serde(skip)]
     pub departs_by: f64,
+    /// What it acts on over which covariates; none for what takes place within the cycle.
+    #[serde(skip)]
+    pub acts: Option<Acts>,
     /// Effects that nearly do the same, and stand in for it where it is missing: stated on one of each two.
     #[serde(skip)]
     pub near: &'static [&'static str],
@@ -370,6 +404,7 @@ impl Effect {
         source: "",
         laws: &[],
         departs_by: 1.0,
+        acts: None,
         needs: &[],
         near: &[],
         imitated_by: &[],

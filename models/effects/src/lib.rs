@@ -45,8 +45,8 @@ pub mod operating;
 pub mod own;
 pub mod predict;
 
-pub use effect::{Check, Effect, Law, Need, Parameter, Place, Prior, STATED_AT_N};
+pub use effect::{Acts, Check, Effect, Input, Law, Need, Parameter, Place, Prior, STATED_AT_N};
 pub use library::{imitated, known, library, near, one_cause, twins};
 pub use operating::{Baseline, Design, Reading};
 pub use own::{at, by_name, own};
-pub use predict::{Active, lateral_force, rough_lateral_force};
+pub use predict::{Active, lateral_force, lateral_force_with, rough_lateral_force};

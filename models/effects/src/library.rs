@@ -10,9 +10,10 @@ use crate::own::by_name;
 /// What every cause's file needs.
 mod prelude {
     pub use crate::contact::Contact;
-    pub use crate::effect::{Effect, Law, Need, Parameter, Place, STATED_AT_N};
+    pub use crate::effect::{Acts, Effect, Input, Law, Need, Parameter, Place, STATED_AT_N};
     pub use crate::operating::{Design, LEAST_SHARE, atmospheres};
     pub use models::condition::Condition;
+    pub use models::covariate;
     pub use models::rig_file::CertifiedKey;
 }
 

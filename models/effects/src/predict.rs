@@ -1,8 +1,8 @@
 //! The lateral force of a pass under the baseline and any effects.
 
 use crate::contact::{Contact, mean_friction};
-use crate::effect::Effect;
-use crate::operating::{Baseline, Design, Reading};
+use crate::effect::{Effect, Input};
+use crate::operating::{Baseline, Design, LEAST_SHARE, Reading};
 use models::condition::Condition;
 
 /// An effect with the law and parameters at which it acts.
@@ -19,7 +19,18 @@ pub struct Active<'a> {
 /// Signed mean lateral force that the sensor reads, N. Effects act in the library's order; allocates nothing.
 /// The friction coefficient is the baseline's, not the condition's.
 pub fn lateral_force(baseline: &Baseline, effects: &[Active<'_>], pass: &Condition, design: &Design) -> f64 {
-    read(baseline.contact(pass, design), effects, pass, design)
+    read(baseline.contact(pass, design), effects, None, pass, design)
+}
+
+/// The same with one input beside its value: by e-folds or in its own unit, as [`Input`] has it.
+pub fn lateral_force_with(
+    baseline: &Baseline,
+    effects: &[Active<'_>],
+    beside: (Input, f64),
+    pass: &Condition,
+    design: &Design,
+) -> f64 {
+    read(baseline.contact(pass, design), effects, Some(beside), pass, design)
 }
 
 /// The same within a per cent or so, for searches that only look for places to begin.
@@ -29,10 +40,16 @@ pub fn rough_lateral_force(
     pass: &Condition,
     design: &Design,
 ) -> f64 {
-    read(Contact { coarse: true, ..baseline.contact(pass, design) }, effects, pass, design)
+    read(Contact { coarse: true, ..baseline.contact(pass, design) }, effects, None, pass, design)
 }
 
-fn read(mut contact: Contact, effects: &[Active<'_>], pass: &Condition, design: &Design) -> f64 {
+fn read(
+    mut contact: Contact,
+    effects: &[Active<'_>],
+    beside: Option<(Input, f64)>,
+    pass: &Condition,
+    design: &Design,
+) -> f64 {
     let mut reading = Reading { gain: 1.0, crosstalk: 0.0, offset_n: 0.0 };
     for active in effects {
         (active.effect.change)(active.law, active.theta, pass, design, &mut contact);
@@ -41,6 +58,21 @@ fn read(mut contact: Contact, effects: &[Active<'_>], pass: &Condition, design: 
             let at = Condition { mu0: contact.mu0, ..*pass };
             reading.gain *= own.factor(active.theta[0], &at).unwrap_or(f64::NAN);
         }
+    }
+    match beside {
+        Some((Input::Amplitude, e_folds)) => contact.amplitude_pp *= e_folds.exp(),
+        Some((Input::Speed, e_folds)) => contact.speed *= e_folds.exp(),
+        Some((Input::Stiffness, e_folds)) => {
+            contact.normal_stiffness *= e_folds.exp();
+            contact.lateral_stiffness *= e_folds.exp();
+        }
+        Some((Input::Friction, e_folds)) => contact.mu0 *= e_folds.exp(),
+        Some((Input::Load, newtons)) => {
+            contact.normal_force = (contact.normal_force + newtons).max(LEAST_SHARE * contact.normal_force);
+        }
+        Some((Input::Offset, newtons)) => reading.offset_n += newtons,
+        Some((Input::Crosstalk, share)) => reading.crosstalk += share,
+        None => {}
     }
     let friction = pass.direction.sign() * mean_friction(&contact);
     if reading == (Reading { gain: 1.0, crosstalk: 0.0, offset_n: 0.0 }) {

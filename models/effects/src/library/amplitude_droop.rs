@@ -24,6 +24,7 @@ pub static EFFECT: Effect = Effect {
         Law::new("linear loss", &[Parameter::positive("droop_per_load", "1/N", 0.4, 3.0)])
             .seen_by(CHECK, 0.05),
     ],
+    acts: Some(Acts { on: Input::Amplitude, over: &[&covariate::NORMAL_FORCE] }),
     needs: &[Need::Vibration, Need::Loads],
     change: |law, theta, _, design, c| {
         c.amplitude_pp *= match law {

@@ -19,6 +19,7 @@ pub static EFFECT: Effect = Effect {
         Law::new("dead zone", &[Parameter::signed("missing_amplitude", "m", 0.2e-6, -1e-6, 1e-6)])
             .seen_by(CHECK, 4e-8),
     ],
+    acts: Some(Acts { on: Input::Amplitude, over: &[&covariate::AMPLITUDE] }),
     needs: &[Need::Vibration],
     change: |law, theta, _, _, c| {
         if c.amplitude_pp <= 0.0 {

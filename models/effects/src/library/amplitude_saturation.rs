@@ -27,6 +27,7 @@ pub static EFFECT: Effect = Effect {
         Law::new("compression", &[Parameter::positive("inverse_limit", "1/m", 0.2e6, 5e6)])
             .seen_by(CHECK, 2e4),
     ],
+    acts: Some(Acts { on: Input::Amplitude, over: &[&covariate::AMPLITUDE] }),
     needs: &[Need::Vibration, Need::Amplitudes],
     change: |law, theta, _, design, c| {
         let x = theta[0] * c.amplitude_pp;

@@ -23,6 +23,7 @@ pub static EFFECT: Effect = Effect {
     ],
     departs_by: 0.05,
     near: &["plate_tilt"],
+    acts: Some(Acts { on: Input::Crosstalk, over: &[&covariate::NORMAL_FORCE] }),
     needs: &[Need::Directions],
     change: |law, theta, pass, _, c| {
         if law == 1 {

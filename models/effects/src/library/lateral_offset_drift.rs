@@ -44,6 +44,7 @@ pub static EFFECT: Effect = Effect {
         .needs(&[Need::Temperatures])
         .seen_by(CHECK, 0.0005),
     ],
+    acts: Some(Acts { on: Input::Offset, over: &[&covariate::TIME] }),
     needs: &[Need::Directions],
     read: |law, theta, pass, design, reading| {
         let s = pass.time_s / design.duration_s.max(1e-9);

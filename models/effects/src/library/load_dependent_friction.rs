@@ -20,6 +20,7 @@ pub static EFFECT: Effect = Effect {
         ),
     ],
     near: &["adhesion", "normal_offset"],
+    acts: Some(Acts { on: Input::Friction, over: &[&covariate::NORMAL_FORCE] }),
     needs: &[Need::Loads],
     change: |law, theta, _, design, c| {
         let relative = (c.normal_force / design.reference_load_n).max(1e-3);

@@ -45,6 +45,7 @@ pub static EFFECT: Effect = Effect {
         .seen_by(CHECK, 130.0),
         Law::new("gradient", &[Parameter::signed("gradient", "1/m", 10.0, -60.0, 60.0)]).seen_by(CHECK, 1.0),
     ],
+    acts: Some(Acts { on: Input::Amplitude, over: &[&covariate::POSITION, &covariate::FREQUENCY] }),
     needs: &[Need::Vibration, Need::Positions],
     change: |law, theta, pass, design, c| {
         let x = pass.position_m;

@@ -39,6 +39,7 @@ pub static EFFECT: Effect = Effect {
         )
         .needs(&[Need::Runs]),
     ],
+    acts: Some(Acts { on: Input::Friction, over: &[&covariate::TIME] }),
     needs: &[Need::Time],
     change: |law, theta, pass, _, c| {
         let time = if law == 3 { pass.time_in_run_s() } else { pass.time_s };

@@ -18,6 +18,7 @@ pub static EFFECT: Effect = Effect {
         Law::new("drift over the table", &[Parameter::signed("offset", "N", 0.03, -0.5, 0.5)])
             .seen_by(CHECK, 0.001),
     ],
+    acts: Some(Acts { on: Input::Load, over: &[&covariate::TIME] }),
     needs: &[Need::Loads],
     change: |law, theta, pass, design, c| {
         let share = if law == 0 { 1.0 } else { pass.time_s / design.duration_s.max(1e-9) };

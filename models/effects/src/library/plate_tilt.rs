@@ -17,6 +17,7 @@ pub static EFFECT: Effect = Effect {
             0.002,
         )],
     departs_by: 0.05,
+    acts: Some(Acts { on: Input::Crosstalk, over: &[&covariate::POSITION] }),
     needs: &[Need::Directions],
     change: |_, theta, pass, _, c| {
         if theta[0] != 0.0 {

@@ -32,6 +32,7 @@ pub static EFFECT: Effect = Effect {
             ],
         ),
     ],
+    acts: Some(Acts { on: Input::Friction, over: &[&covariate::SPEED] }),
     needs: &[Need::Speeds],
     change: |law, theta, _, design, c| {
         let reference = design.reference_speed_m_s;

@@ -64,6 +64,7 @@ pub static EFFECT: Effect = Effect {
         )
         .seen_by(CHECK, 0.05),
     ],
+    acts: Some(Acts { on: Input::Amplitude, over: &[&covariate::TIME] }),
     needs: &[Need::Vibration],
     change: |law, theta, pass, design, c| {
         if law == 3 {

@@ -29,6 +29,7 @@ pub static EFFECT: Effect = Effect {
         .seen_by(CHECK, 0.003),
     ],
     near: &["amplitude_miscalibration"],
+    acts: Some(Acts { on: Input::Speed, over: &[&covariate::SPEED] }),
     needs: &[Need::Vibration],
     change: |law, theta, _, design, c| match law {
         0 => c.speed *= theta[0].exp(),

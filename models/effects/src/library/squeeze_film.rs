@@ -55,6 +55,7 @@ pub static EFFECT: Effect = Effect {
         Law::new("share by powers", &POWERS).seen_by(CHECK, 0.1),
         Law::new("friction by powers", &POWERS).seen_by(CHECK, 0.1),
     ],
+    acts: Some(Acts { on: Input::Load, over: &[&covariate::AMPLITUDE, &covariate::FREQUENCY] }),
     needs: &[Need::Vibration, Need::Amplitudes],
     change: |law, theta, pass, design, c| {
         let air = atmospheres(pass);

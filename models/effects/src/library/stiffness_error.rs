@@ -17,6 +17,7 @@ pub static EFFECT: Effect = Effect {
             .acts_as([0.0, 1.0, 1.0]),
     ],
     near: &["speed_error", "amplitude_miscalibration", "subsurface_relaxation"],
+    acts: Some(Acts { on: Input::Stiffness, over: &[&covariate::NORMAL_FORCE] }),
     needs: &[Need::Vibration],
     change: |law, theta, _, _, c| {
         let factor = theta[0].exp();

@@ -1,0 +1,218 @@
+//! How a hypothesis may depart from its form.
+//!
+//! A cause's change may bend smoothly over all covariates, in proportion to itself. And where a cause acts on one input (the
+//! amplitude, say) by a size that is a function of few covariates (of time alone), that function may be any smooth one: the
+//! mechanism stays, the formula goes.
+
+use crate::constants::Constants;
+use crate::evidence::recalibration;
+use crate::fit::Problem;
+use crate::kernel::{Coordinates, Kernel, Lengths, form_lengths};
+use crate::layout::{Layout, NUISANCES};
+use crate::member::Member;
+use models::condition::Condition;
+use models::covariate::{Covariate, Role, SMOOTH};
+use nalgebra::{DMatrix, DVector};
+
+/// Standard deviations of the departures, as shares of the cause's change net of recalibration.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Freedom {
+    /// Of the change itself, over all covariates.
+    pub share: f64,
+    /// Of what the cause acts on, over the covariates of its mechanism.
+    pub bend: f64,
+}
+
+impl Freedom {
+    /// None: the library's form, or no cause.
+    pub const NONE: Freedom = Freedom { share: 0.0, bend: 0.0 };
+
+    /// Of the change alone.
+    pub const fn share(share: f64) -> Self {
+        Freedom { share, bend: 0.0 }
+    }
+}
+
+/// The kernels of all departures on one table.
+#[derive(Debug, Clone)]
+pub struct Kernels {
+    coordinates: Coordinates,
+    largest_amplitude: f64,
+    smooth: (Lengths, Kernel),
+    /// By effect; without those whose covariates do not change in the table.
+    bends: Vec<(usize, Lengths, Kernel)>,
+}
+
+impl Kernels {
+    /// The kernels on a table's passes, for these effects.
+    pub fn on(problem: &Problem, coordinates: Coordinates, effects: &[usize]) -> Self {
+        let k = &problem.constants;
+        let largest = problem.design.largest_amplitude_m;
+        let kernel = |lengths: &Lengths| {
+            let place = |p: &Condition| coordinates.place(p, largest, lengths);
+            let places: Vec<_> = problem.passes.iter().map(place).collect();
+            Kernel::new(&places, k.form_rank, k.kernel_rest)
+        };
+        let smooth = form_lengths(k);
+        let smooth = (smooth, kernel(&smooth));
+        let bends = effects.iter().filter_map(|&effect| {
+            let lengths = bend_lengths(k, effects::at(effect).acts?.over);
+            let kernel = kernel(&lengths);
+            (kernel.rank() > 1).then_some((effect, lengths, kernel))
+        });
+        let bends = bends.collect();
+        Kernels { largest_amplitude: largest, smooth, bends, coordinates }
+    }
+
+    /// Their bases at passes.
+    pub fn at(&self, passes: &[Condition]) -> Basis {
+        let basis = |(lengths, kernel): (&Lengths, &Kernel)| {
+            let place = |p: &Condition| self.coordinates.place(p, self.largest_amplitude, lengths);
+            kernel.matrix(&passes.iter().map(place).collect::<Vec<_>>())
+        };
+        let (lengths, kernel) = &self.smooth;
+        let bends = self.bends.iter().map(|(effect, lengths, kernel)| (*effect, basis((lengths, kernel))));
+        Basis { smooth: basis((lengths, kernel)), bends: bends.collect() }
+    }
+}
+
+fn bend_lengths(k: &Constants, over: &[&Covariate]) -> Lengths {
+    let place = over.iter().any(|c| c.role == Role::Place);
+    Lengths {
+        condition: if place { k.form_length } else { k.bend_length },
+        time: k.bend_length,
+        position: k.bend_place_length,
+        climate: f64::INFINITY,
+        seen: std::array::from_fn(|i| over.iter().any(|c| c.name == SMOOTH[i].name)),
+    }
+}
+
+/// Values of the smooth functions at some passes.
+#[derive(Debug, Clone)]
+pub struct Basis {
+    /// Over all covariates: a row a pass.
+    pub smooth: DMatrix<f64>,
+    bends: Vec<(usize, DMatrix<f64>)>,
+}
+
+impl Basis {
+    /// Of no departure.
+    pub fn none(passes: usize) -> Self {
+        Basis { smooth: DMatrix::zeros(passes, 0), bends: Vec::new() }
+    }
+
+    /// Of some of the passes.
+    pub fn select(&self, rows: &[usize]) -> Self {
+        let of = |m: &DMatrix<f64>| m.select_rows(rows.iter());
+        Basis { smooth: of(&self.smooth), bends: self.bends.iter().map(|(e, m)| (*e, of(m))).collect() }
+    }
+
+    fn of(&self, effect: usize) -> Option<&DMatrix<f64>> {
+        self.bends.iter().find(|(e, _)| *e == effect).map(|(_, basis)| basis)
+    }
+
+    /// Whether a member of a hypothesis can be bent.
+    pub fn bends(&self, members: &[Member]) -> bool {
+        members.iter().any(|m| self.of(m.effect).is_some())
+    }
+}
+
+/// What departures are proportional to, at some passes.
+#[derive(Debug, Clone)]
+pub struct Change {
+    /// The change by all members, net of what recalibration could imitate, N.
+    pub net: DVector<f64>,
+    /// Of each effect that is bent: deviation in the unit of its input, and the force that this makes, N.
+    pub bent: Vec<(usize, f64, DVector<f64>)>,
+}
+
+impl Change {
+    /// No cause changes anything.
+    pub fn none(passes: usize) -> Self {
+        Change { net: DVector::zeros(passes), bent: Vec::new() }
+    }
+
+    /// By a hypothesis at coordinates where it predicts this; what is bent has the net size of the member's own change.
+    pub fn by(
+        problem: &Problem,
+        members: &[Member],
+        u: &[f64],
+        prediction: &DVector<f64>,
+        basis: &Basis,
+        freedom: Freedom,
+    ) -> Self {
+        if members.is_empty() {
+            return Change::none(problem.len());
+        }
+        let (raw, jacobian, shift) = recalibration(problem, u, prediction);
+        let net = raw - &jacobian * shift;
+        let mut bent = Vec::new();
+        for (i, member) in members.iter().enumerate().filter(|_| freedom.bend > 0.0) {
+            let (Some(acts), Some(_)) = (effects::at(member.effect).acts, basis.of(member.effect)) else {
+                continue;
+            };
+            let own = match members.len() {
+                1 => net.clone(),
+                _ => beside_recalibration(problem, &jacobian, &(prediction - without(problem, members, u, i))),
+            };
+            let slope = problem.sensitivity(members, u, prediction, acts.on);
+            let size = norm(problem, &own)
+                / norm(problem, &beside_recalibration(problem, &jacobian, &slope)).max(1e-300);
+            bent.push((member.effect, freedom.bend * size, slope * (freedom.bend * size)));
+        }
+        Change { net, bent }
+    }
+
+    /// The same at conditions of another problem, with the recalibration and the deviations of this one.
+    pub fn at(&self, out: &Problem, members: &[Member], u: &[f64], shift: &DVector<f64>) -> Self {
+        let plain = out.predict(members, u);
+        let under = out.predict(&[], &u[..NUISANCES]);
+        let net = &plain - &under - out.jacobian(&[], &u[..NUISANCES], &under) * shift;
+        let bent = self.bent.iter().filter_map(|(effect, sd, _)| {
+            let slope = out.sensitivity(members, u, &plain, effects::at(*effect).acts?.on);
+            Some((*effect, *sd, slope * *sd))
+        });
+        Change { net, bent: bent.collect() }
+    }
+
+    /// Columns of the departure, N: independent standard deviates times these.
+    pub fn columns(&self, basis: &Basis, share: f64) -> DMatrix<f64> {
+        let smooth = (share > 0.0).then_some((&basis.smooth, &self.net, share));
+        let bent = self.bent.iter().filter_map(|(effect, _, force)| Some((basis.of(*effect)?, force, 1.0)));
+        let parts: Vec<_> = smooth.into_iter().chain(bent).collect();
+        let mut all = DMatrix::zeros(self.net.len(), parts.iter().map(|(m, ..)| m.ncols()).sum());
+        let mut at = 0;
+        for (m, by, factor) in parts {
+            for column in m.column_iter() {
+                all.set_column(at, &(column.component_mul(by) * factor));
+                at += 1;
+            }
+        }
+        all
+    }
+}
+
+fn without(problem: &Problem, members: &[Member], u: &[f64], member: usize) -> DVector<f64> {
+    let (mut rest, mut v) = (members.to_vec(), u.to_vec());
+    rest.remove(member);
+    v.drain(Layout::of(members).member(member));
+    problem.predict(&rest, &v)
+}
+
+fn norm(problem: &Problem, force: &DVector<f64>) -> f64 {
+    force.iter().zip(&problem.variance).map(|(x, v)| x * x / v).sum::<f64>().sqrt()
+}
+
+/// What the nuisances cannot imitate of a force, to first order.
+fn beside_recalibration(problem: &Problem, jacobian: &DMatrix<f64>, force: &DVector<f64>) -> DVector<f64> {
+    let mut weighted = jacobian.clone();
+    for (i, v) in problem.variance.iter().enumerate() {
+        weighted.row_mut(i).scale_mut(1.0 / v);
+    }
+    let t = weighted.transpose();
+    let hessian = &t * jacobian + DMatrix::identity(NUISANCES, NUISANCES);
+    match hessian.cholesky() {
+        Some(c) => force - jacobian * c.solve(&(t * force)),
+        None => force.clone(),
+    }
+}
