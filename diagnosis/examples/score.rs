@@ -165,7 +165,7 @@ fn score(folder: &Path, options: &Options, changes: &[Constants]) -> Result<Line
                 (
                     c.names().join("+"),
                     c.log_evidence - none,
-                    fitted.problem.misfit(&b.prediction),
+                    fitted.problem.misfit(&b.mechanism),
                     b.pull(),
                     b.freedom.share + 10.0 * b.freedom.bend,
                 )

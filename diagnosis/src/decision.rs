@@ -195,13 +195,13 @@ fn left_by_a_form_of_its_own(fitted: &Fitted, cause: &Candidate) -> f64 {
 
 /// chi2 that a model leaves beyond scatter.
 fn left(fitted: &Fitted, model: &Posterior) -> f64 {
-    fitted.problem.misfit(&model.prediction) - fitted.problem.len() as f64
+    fitted.problem.misfit(&model.mechanism) - fitted.problem.len() as f64
 }
 
 /// Whether a rival says the same as the leader with no more parameters.
 fn same_said(fitted: &Fitted, leader: usize, rival: usize) -> bool {
     let [a, b] = [leader, rival].map(|i| &fitted.candidates[i].best);
-    let apart = fitted.problem.chi2(&(&a.prediction - &b.prediction));
+    let apart = fitted.problem.chi2(&(&a.mechanism - &b.mechanism));
     b.u.len() <= a.u.len() && apart < fitted.problem.constants.same_forces_chi2
 }
 

@@ -122,8 +122,18 @@ impl Basis {
 pub struct Change {
     /// The change by all members, net of what recalibration could imitate, N.
     pub net: DVector<f64>,
-    /// Of each effect that is bent: deviation in the unit of its input, and the force that this makes, N.
-    pub bent: Vec<(usize, f64, DVector<f64>)>,
+    /// Of each effect that is bent.
+    pub bent: Vec<Bent>,
+}
+
+/// What one effect's bending makes.
+#[derive(Debug, Clone)]
+pub struct Bent {
+    effect: usize,
+    /// Standard deviation, in the unit of its input.
+    sd: f64,
+    /// One standard deviation, N.
+    force: DVector<f64>,
 }
 
 impl Change {
@@ -145,20 +155,21 @@ impl Change {
             return Change::none(problem.len());
         }
         let (raw, jacobian, shift) = recalibration(problem, u, prediction);
-        let net = raw - &jacobian * shift;
+        let net = &raw - &jacobian * shift;
         let mut bent = Vec::new();
         for (i, member) in members.iter().enumerate().filter(|_| freedom.bend > 0.0) {
             let (Some(acts), Some(_)) = (effects::at(member.effect).acts, basis.of(member.effect)) else {
                 continue;
             };
             let own = match members.len() {
-                1 => net.clone(),
-                _ => beside_recalibration(problem, &jacobian, &(prediction - without(problem, members, u, i))),
+                1 => raw.clone(),
+                _ => prediction - without(problem, members, u, i),
             };
+            let own = beside_recalibration(problem, &jacobian, &own);
             let slope = problem.sensitivity(members, u, prediction, acts.on);
-            let size = norm(problem, &own)
-                / norm(problem, &beside_recalibration(problem, &jacobian, &slope)).max(1e-300);
-            bent.push((member.effect, freedom.bend * size, slope * (freedom.bend * size)));
+            let unit = norm(problem, &beside_recalibration(problem, &jacobian, &slope));
+            let sd = freedom.bend * norm(problem, &own) / unit.max(1e-300);
+            bent.push(Bent { effect: member.effect, sd, force: slope * sd });
         }
         Change { net, bent }
     }
@@ -168,18 +179,24 @@ impl Change {
         let plain = out.predict(members, u);
         let under = out.predict(&[], &u[..NUISANCES]);
         let net = &plain - &under - out.jacobian(&[], &u[..NUISANCES], &under) * shift;
-        let bent = self.bent.iter().filter_map(|(effect, sd, _)| {
-            let slope = out.sensitivity(members, u, &plain, effects::at(*effect).acts?.on);
-            Some((*effect, *sd, slope * *sd))
+        let bent = self.bent.iter().filter_map(|bent| {
+            let slope = out.sensitivity(members, u, &plain, effects::at(bent.effect).acts?.on);
+            Some(Bent { force: slope * bent.sd, ..*bent })
         });
         Change { net, bent: bent.collect() }
     }
 
-    /// Columns of the departure, N: independent standard deviates times these.
+    /// Whether something is bent over this covariate.
+    pub fn bends_over(&self, covariate: &Covariate) -> bool {
+        let over = |b: &Bent| effects::at(b.effect).acts.map_or(&[][..], |acts| acts.over);
+        self.bent.iter().any(|b| over(b).iter().any(|c| c.name == covariate.name))
+    }
+
+    /// Columns of the departure, N: independent standard deviates times these. What is bent comes first.
     pub fn columns(&self, basis: &Basis, share: f64) -> DMatrix<f64> {
         let smooth = (share > 0.0).then_some((&basis.smooth, &self.net, share));
-        let bent = self.bent.iter().filter_map(|(effect, _, force)| Some((basis.of(*effect)?, force, 1.0)));
-        let parts: Vec<_> = smooth.into_iter().chain(bent).collect();
+        let bent = self.bent.iter().filter_map(|bent| Some((basis.of(bent.effect)?, &bent.force, 1.0)));
+        let parts: Vec<_> = bent.chain(smooth).collect();
         let mut all = DMatrix::zeros(self.net.len(), parts.iter().map(|(m, ..)| m.ncols()).sum());
         let mut at = 0;
         for (m, by, factor) in parts {
@@ -203,7 +220,7 @@ fn norm(problem: &Problem, force: &DVector<f64>) -> f64 {
     force.iter().zip(&problem.variance).map(|(x, v)| x * x / v).sum::<f64>().sqrt()
 }
 
-/// What the nuisances cannot imitate of a force, to first order.
+/// What recalibration cannot imitate of a force, to first order.
 fn beside_recalibration(problem: &Problem, jacobian: &DMatrix<f64>, force: &DVector<f64>) -> DVector<f64> {
     let mut weighted = jacobian.clone();
     for (i, v) in problem.variance.iter().enumerate() {
@@ -211,8 +228,5 @@ fn beside_recalibration(problem: &Problem, jacobian: &DMatrix<f64>, force: &DVec
     }
     let t = weighted.transpose();
     let hessian = &t * jacobian + DMatrix::identity(NUISANCES, NUISANCES);
-    match hessian.cholesky() {
-        Some(c) => force - jacobian * c.solve(&(t * force)),
-        None => force.clone(),
-    }
+    hessian.cholesky().map_or_else(|| force.clone(), |c| force - jacobian * c.solve(&(t * force)))
 }

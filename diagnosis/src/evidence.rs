@@ -41,6 +41,8 @@ pub struct Posterior {
     pub log_evidence: f64,
     /// Prediction of the form itself, N.
     pub prediction: DVector<f64>,
+    /// Prediction of the mechanism, N: the form with what is bent.
+    pub mechanism: DVector<f64>,
     /// The effects' change net of recalibration, and what is bent.
     pub change: Change,
     /// Posterior covariance of the coordinates.
@@ -181,14 +183,17 @@ pub fn laplace(
             log_evidence += log_half_line(u[at] / sd, beyond);
         }
     }
-    let columns = change.columns(basis, freedom.share).ncols();
-    let departure = covariance.weights(&residual).rows(0, columns).into_owned();
+    let columns = change.columns(basis, freedom.share);
+    let departure = covariance.weights(&residual).rows(0, columns.ncols()).into_owned();
+    let bent = change.columns(basis, 0.0);
+    let mechanism = &m + &bent * departure.rows(0, bent.ncols());
     Posterior {
         members: members.to_vec(),
         u,
         freedom,
         log_evidence,
         prediction: m,
+        mechanism,
         change,
         covariance: posterior,
         departure,

@@ -177,7 +177,7 @@ pub fn fit_believing(table: &Table, rig: &RigFile, options: &Options, belief: &B
 fn explained_by(problem: &Problem, scatter: &Scatter, cause: &Posterior) -> Vec<usize> {
     let explains = |row: &usize| {
         let own = problem.whole_variance(*row) / scatter.inflation[*row];
-        (problem.lateral[*row] - cause.prediction[*row]).powi(2)
+        (problem.lateral[*row] - cause.mechanism[*row]).powi(2)
             < problem.constants.explained_sd.powi(2) * own
     };
     scatter.suspects.iter().map(|s| s.row).filter(explains).collect()
@@ -242,7 +242,7 @@ fn second_causes(
 ) -> Vec<Candidate> {
     let best = &singles[0].best;
     let behind = open - singles[0].log_evidence;
-    let misfit = problem.misfit(&best.prediction) + best.pull();
+    let misfit = problem.misfit(&best.mechanism) + best.pull();
     let n = problem.len() as f64;
     let k = &problem.constants;
     if misfit <= n + k.misfit_sd * (2.0 * n).sqrt() && behind < k.pairs_from_nats {

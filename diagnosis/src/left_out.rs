@@ -9,6 +9,9 @@ use crate::gaussian::Covariance;
 use crate::layout::Layout;
 use crate::least_squares::{Fit, minimise};
 use models::condition::Condition;
+use models::covariate::{
+    AMBIENT_PRESSURE, AMPLITUDE, Covariate, FREQUENCY, NORMAL_FORCE, SPEED, TIME,
+};
 use nalgebra::{DMatrix, DVector};
 use rayon::prelude::*;
 
@@ -55,14 +58,25 @@ const ROUNDING: f64 = 1e-6;
 /// Relative difference within which two frequencies are one.
 const ONE_FREQUENCY: f64 = 1e-3;
 
+/// Passes at one end of a covariate, or at one level of it.
+pub struct Part {
+    /// In words.
+    pub name: String,
+    /// The covariate that tells them from the rest.
+    pub over: &'static Covariate,
+    /// Their rows.
+    pub rows: Vec<usize>,
+}
+
 /// Parts of the operating space that are worth leaving out: ends of each covariate, each frequency, late passes.
-pub fn regions(problem: &Problem) -> Vec<(String, Vec<usize>)> {
+pub fn regions(problem: &Problem) -> Vec<Part> {
     let n = problem.len();
     let p = &problem.passes;
-    let mut list: Vec<(String, Vec<usize>)> = Vec::new();
+    let mut list: Vec<Part> = Vec::new();
     let k = &problem.constants;
     let ends =
-        |name: &str, value: &dyn Fn(usize) -> f64, of: &[usize], list: &mut Vec<(String, Vec<usize>)>| {
+        |over: &'static Covariate, name: &str, of: &[usize], list: &mut Vec<Part>| {
+            let value = |i: usize| over.of(&p[i]).unwrap_or(f64::NAN);
             let mut sorted: Vec<f64> = of.iter().map(|&i| value(i)).collect();
             sorted.sort_by(f64::total_cmp);
             if sorted.len() < 2 * k.region_least || sorted[sorted.len() - 1] <= sorted[0] * ONE_LEVEL {
@@ -74,15 +88,15 @@ pub fn regions(problem: &Problem) -> Vec<(String, Vec<usize>)> {
             let above: Vec<usize> = of.iter().copied().filter(|&i| value(i) >= high).collect();
             for (word, rows) in [("low", below), ("high", above)] {
                 if rows.len() >= k.region_least && rows.len() as f64 <= k.region_most * n as f64 + ROUNDING {
-                    list.push((format!("{word} {name}"), rows));
+                    list.push(Part { name: format!("{word} {name}"), over, rows });
                 }
             }
         };
     let all: Vec<usize> = (0..n).collect();
     let vibrating: Vec<usize> = (0..n).filter(|&i| p[i].amplitude.metres() > 0.0).collect();
-    ends("amplitude", &|i| p[i].amplitude.metres(), &vibrating, &mut list);
-    ends("speed", &|i| p[i].speed_m_s, &all, &mut list);
-    ends("load", &|i| p[i].normal_force_n, &all, &mut list);
+    ends(&AMPLITUDE, "amplitude", &vibrating, &mut list);
+    ends(&SPEED, "speed", &all, &mut list);
+    ends(&NORMAL_FORCE, "load", &all, &mut list);
     let mut frequencies: Vec<f64> = p.iter().map(|q| q.frequency_hz).collect();
     frequencies.sort_by(f64::total_cmp);
     frequencies.dedup_by(|a, b| (*a / *b - 1.0).abs() < ONE_FREQUENCY);
@@ -92,23 +106,23 @@ pub fn regions(problem: &Problem) -> Vec<(String, Vec<usize>)> {
                 (0..n).filter(|&i| (p[i].frequency_hz / f - 1.0).abs() < ONE_FREQUENCY).collect();
             if rows.len() >= k.region_least && rows.len() as f64 <= k.region_most_level * n as f64 + ROUNDING
             {
-                list.push((format!("{f:.0} Hz"), rows));
+                list.push(Part { name: format!("{f:.0} Hz"), over: &FREQUENCY, rows });
             }
         }
     }
     let late: Vec<usize> =
         all.iter().copied().filter(|&i| i as f64 >= (1.0 - k.late_share) * n as f64).collect();
-    list.push(("late".to_string(), late));
+    list.push(Part { name: "late".to_string(), over: &TIME, rows: late });
     let pressures: Vec<f64> = p.iter().filter_map(|q| q.ambient_pressure_pa).collect();
     if pressures.len() == n {
         let top = pressures.iter().copied().fold(0.0, f64::max);
         let rows: Vec<usize> = (0..n).filter(|&i| pressures[i] < k.low_pressure * top).collect();
         if rows.len() >= k.region_least && rows.len() as f64 <= k.region_most_level * n as f64 + ROUNDING {
-            list.push(("low pressure".to_string(), rows));
+            list.push(Part { name: "low pressure".to_string(), over: &AMBIENT_PRESSURE, rows });
         }
     }
     // A region needs a rest to be predicted from.
-    list.retain(|(_, rows)| rows.len() < n);
+    list.retain(|part| part.rows.len() < n);
     list
 }
 
@@ -218,7 +232,7 @@ pub fn left_out_regions(fitted: &Fitted, best: &Posterior) -> Vec<Region> {
     let own = own_changes(problem, best);
     regions(problem)
         .into_par_iter()
-        .map(|(name, rows)| {
+        .map(|Part { name, over, rows }| {
             let others = without(problem, &rows);
             let shown = own.iter().all(|change| {
                 let seen: f64 = others.iter().map(|&i| change[i]).sum();
@@ -238,7 +252,8 @@ pub fn left_out_regions(fitted: &Fitted, best: &Posterior) -> Vec<Region> {
             let gap = rest.misfit(&refit.prediction) - rest.len() as f64;
             let scatter = (2.0 * rest.len() as f64).sqrt();
             let informed = shown && gap > k.carrying_sd * scatter && gap > k.informed_share * whole;
-            let judges = !tells_nothing(problem, &rest, best);
+            // A function that may be any says nothing of values that it was not seen at.
+            let judges = !tells_nothing(problem, &rest, best) && !best.change.bends_over(over);
             Region { name, rows, errors, informed, judges }
         })
         .collect()

@@ -365,7 +365,7 @@ pub struct Effect {
     /// plate looks like a cross-talk that is off by a third).
     #[serde(skip)]
     pub departs_by: f64,
-    /// What it acts on over which covariates; none for what takes place within the cycle.
+    /// What it acts on over which covariates; none where nothing more than its laws is known.
     #[serde(skip)]
     pub acts: Option<Acts>,
     /// Effects that nearly do the same, and stand in for it where it is missing: stated on one of each two.
