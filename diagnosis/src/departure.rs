@@ -230,3 +230,63 @@ fn beside_recalibration(problem: &Problem, jacobian: &DMatrix<f64>, force: &DVec
     let hessian = &t * jacobian + DMatrix::identity(NUISANCES, NUISANCES);
     hessian.cholesky().map_or_else(|| force.clone(), |c| force - jacobian * c.solve(&(t * force)))
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::data::Table;
+    use crate::evidence::{averaged_over_form, laplace};
+    use crate::example::{Deviates, rig, table};
+    use crate::least_squares::minimise;
+    use effects::{Baseline, by_name};
+
+    /// A table on which the amplitude falls to half of itself and comes back while the plate passes through its resonance.
+    fn through_a_resonance() -> Table {
+        let mut table = table(&mut Deviates(5), 0.0);
+        let finger = rig().finger;
+        let baseline = Baseline {
+            mu0: 0.5,
+            normal_stiffness_n_per_m: finger.normal_stiffness_n_per_m,
+            lateral_stiffness_n_per_m: finger.lateral_stiffness_n_per_m,
+        };
+        let mut draw = Deviates(6);
+        for (p, lateral) in table.passes.iter().zip(&mut table.lateral) {
+            let share = 2.0 * (p.time_s / table.design.duration_s - 0.5);
+            let moved = models::quantity::PeakToPeak::from_metres(
+                p.amplitude.metres() * (0.5 + 0.5 * (-4.0 * share * share).exp()),
+            );
+            let there = Condition { amplitude: moved, ..*p };
+            let force = effects::lateral_force(&baseline, &[], &there, &table.design);
+            *lateral = force * (1.0 + 0.02 * draw.normal()) + 0.001 * draw.normal();
+        }
+        table
+    }
+
+    /// The library's detuning falls with time and stays down. Bent over time it follows a plate that comes back; at other
+    /// conditions its departure is what it is at the table's.
+    #[test]
+    fn a_detuning_that_comes_back_is_a_detuning() {
+        let table = through_a_resonance();
+        let mut problem = Problem::new(&table, &rig(), &Default::default());
+        crate::noise::settle(&table, &rig(), &mut problem, &crate::scatter::Belief::Judged);
+        let effect = (0..effects::library().len())
+            .find(|&e| effects::library()[e].name == by_name("resonance_detuning").map_or("", |e| e.name))
+            .unwrap();
+        let kernels = Kernels::on(&problem, Coordinates::of(&table), &[effect]);
+        let basis = kernels.at(&problem.passes);
+        let members = [Member { effect, law: 5 }];
+        let fit = minimise(&problem, &members, &[0.0, 0.0, 0.0, 0.3, 0.0, 0.5, 0.0], &problem.variance, 15);
+        let large = Freedom::share(problem.constants.form_shares[2]);
+        let alone = laplace(&problem, &members, &fit.u, &basis, large, 6);
+        let bent = Freedom { share: problem.constants.form_shares[1], bend: problem.constants.bend_share };
+        let bent = laplace(&problem, &members, &fit.u, &basis, bent, 6);
+        let gained = bent.log_evidence - alone.log_evidence;
+        assert!(gained > 3.0, "{gained:.1} nats");
+        let shift = recalibration(&problem, &bent.u, &bent.prediction).2;
+        let again = bent.change.at(&problem, &members, &bent.u, &shift);
+        let [here, there] = [&bent.change, &again].map(|c| c.columns(&basis, bent.freedom.share));
+        assert!((&here - &there).amax() < 1e-9 * here.amax());
+        let (_, best) = averaged_over_form(&problem, &fit, &members, &basis);
+        assert!(best.freedom.bend > 0.0 && best.by_law().freedom.bend == 0.0);
+    }
+}

@@ -49,9 +49,16 @@ pub struct Posterior {
     pub covariance: DMatrix<f64>,
     /// Weights of the departure from the form, on its columns ([`Change::columns`]).
     pub departure: DVector<f64>,
+    /// The same law where nothing is bent; none where it is so already. See [`Posterior::by_law`].
+    pub plain: Option<Box<Posterior>>,
 }
 
 impl Posterior {
+    /// The hypothesis by its law: parameters that a rig can use, where the bent one has a function beside them.
+    pub fn by_law(&self) -> &Posterior {
+        self.plain.as_deref().unwrap_or(self)
+    }
+
     /// The departure from the form at the passes of the fit, N.
     pub fn departed(&self, basis: &Basis) -> DVector<f64> {
         self.change.columns(basis, self.freedom.share) * &self.departure
@@ -197,6 +204,7 @@ pub fn laplace(
         change,
         covariance: posterior,
         departure,
+        plain: None,
     }
 }
 
@@ -258,14 +266,14 @@ pub fn averaged_over_form(
     let [first, second, third] = MODE_ROUNDS;
     let middle = laplace(problem, members, &fit.u, basis, middle_freedom(k, members), second);
     let from = |freedom: Freedom, rounds: usize| laplace(problem, members, &middle.u, basis, freedom, rounds);
-    let [one, two, three] = k.form_weights;
+    let [one, two, three, four] = k.form_weights;
     let mut list = vec![(from(Freedom::share(small), first), one)];
     if most >= large {
         list.push((from(Freedom::share(large), third), three));
     }
     if basis.bends(members) {
         let bent = Freedom { share: middle.freedom.share, bend: k.bend_share };
-        list.push((from(bent, second), k.bend_weight));
+        list.push((from(bent, second), four));
     }
     if most >= medium {
         list.push((middle, two));
@@ -275,14 +283,19 @@ pub fn averaged_over_form(
     let total = log_sum_exp(&weighted);
     let best =
         (0..list.len()).max_by(|&a, &b| weighted[a].total_cmp(&weighted[b])).expect("at least one share");
-    (total, list.swap_remove(best).0)
+    let plain = (0..list.len())
+        .filter(|&i| list[i].0.freedom.bend == 0.0)
+        .max_by(|&a, &b| weighted[a].total_cmp(&weighted[b]))
+        .filter(|_| list[best].0.freedom.bend > 0.0)
+        .map(|i| Box::new(list[i].0.clone()));
+    (total, Posterior { plain, ..list.swap_remove(best).0 })
 }
 
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::example::{Deviates, rig, table};
     use crate::departure::Kernels;
+    use crate::example::{Deviates, rig, table};
     use crate::kernel::Coordinates;
     use crate::least_squares::minimise;
 

@@ -333,7 +333,13 @@ impl Problem {
     }
 
     /// Change of the predictions for a unit of an input, as [`effects::Input`] has it, with the hypothesis in force.
-    pub fn sensitivity(&self, members: &[Member], u: &[f64], at: &DVector<f64>, input: Input) -> DVector<f64> {
+    pub fn sensitivity(
+        &self,
+        members: &[Member],
+        u: &[f64],
+        at: &DVector<f64>,
+        input: Input,
+    ) -> DVector<f64> {
         let step = STEPS[1] * if input == Input::Load { self.design.reference_load_n } else { 1.0 };
         let with = |b: &Baseline, a: &[Active<'_>], p: &Condition, d: &Design| {
             effects::lateral_force_with(b, a, (input, step), p, d)

@@ -177,8 +177,7 @@ pub fn fit_believing(table: &Table, rig: &RigFile, options: &Options, belief: &B
 fn explained_by(problem: &Problem, scatter: &Scatter, cause: &Posterior) -> Vec<usize> {
     let explains = |row: &usize| {
         let own = problem.whole_variance(*row) / scatter.inflation[*row];
-        (problem.lateral[*row] - cause.mechanism[*row]).powi(2)
-            < problem.constants.explained_sd.powi(2) * own
+        (problem.lateral[*row] - cause.mechanism[*row]).powi(2) < problem.constants.explained_sd.powi(2) * own
     };
     scatter.suspects.iter().map(|s| s.row).filter(explains).collect()
 }

@@ -40,7 +40,13 @@ impl Lengths {
 /// place.
 pub fn form_lengths(k: &Constants) -> Lengths {
     let far = f64::INFINITY;
-    Lengths { condition: k.form_length, time: k.form_length, position: far, climate: far, seen: [true; COUNT] }
+    Lengths {
+        condition: k.form_length,
+        time: k.form_length,
+        position: far,
+        climate: far,
+        seen: [true; COUNT],
+    }
 }
 
 /// Standardised covariates of passes.

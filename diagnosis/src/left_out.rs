@@ -9,9 +9,7 @@ use crate::gaussian::Covariance;
 use crate::layout::Layout;
 use crate::least_squares::{Fit, minimise};
 use models::condition::Condition;
-use models::covariate::{
-    AMBIENT_PRESSURE, AMPLITUDE, Covariate, FREQUENCY, NORMAL_FORCE, SPEED, TIME,
-};
+use models::covariate::{AMBIENT_PRESSURE, AMPLITUDE, Covariate, FREQUENCY, NORMAL_FORCE, SPEED, TIME};
 use nalgebra::{DMatrix, DVector};
 use rayon::prelude::*;
 
@@ -74,24 +72,23 @@ pub fn regions(problem: &Problem) -> Vec<Part> {
     let p = &problem.passes;
     let mut list: Vec<Part> = Vec::new();
     let k = &problem.constants;
-    let ends =
-        |over: &'static Covariate, name: &str, of: &[usize], list: &mut Vec<Part>| {
-            let value = |i: usize| over.of(&p[i]).unwrap_or(f64::NAN);
-            let mut sorted: Vec<f64> = of.iter().map(|&i| value(i)).collect();
-            sorted.sort_by(f64::total_cmp);
-            if sorted.len() < 2 * k.region_least || sorted[sorted.len() - 1] <= sorted[0] * ONE_LEVEL {
-                return;
+    let ends = |over: &'static Covariate, name: &str, of: &[usize], list: &mut Vec<Part>| {
+        let value = |i: usize| over.of(&p[i]).unwrap_or(f64::NAN);
+        let mut sorted: Vec<f64> = of.iter().map(|&i| value(i)).collect();
+        sorted.sort_by(f64::total_cmp);
+        if sorted.len() < 2 * k.region_least || sorted[sorted.len() - 1] <= sorted[0] * ONE_LEVEL {
+            return;
+        }
+        let cut = |q: f64| sorted[((sorted.len() - 1) as f64 * q.min(1.0)) as usize];
+        let (low, high) = (cut(k.region_cuts[0]), cut(k.region_cuts[1]));
+        let below: Vec<usize> = of.iter().copied().filter(|&i| value(i) <= low).collect();
+        let above: Vec<usize> = of.iter().copied().filter(|&i| value(i) >= high).collect();
+        for (word, rows) in [("low", below), ("high", above)] {
+            if rows.len() >= k.region_least && rows.len() as f64 <= k.region_most * n as f64 + ROUNDING {
+                list.push(Part { name: format!("{word} {name}"), over, rows });
             }
-            let cut = |q: f64| sorted[((sorted.len() - 1) as f64 * q.min(1.0)) as usize];
-            let (low, high) = (cut(k.region_cuts[0]), cut(k.region_cuts[1]));
-            let below: Vec<usize> = of.iter().copied().filter(|&i| value(i) <= low).collect();
-            let above: Vec<usize> = of.iter().copied().filter(|&i| value(i) >= high).collect();
-            for (word, rows) in [("low", below), ("high", above)] {
-                if rows.len() >= k.region_least && rows.len() as f64 <= k.region_most * n as f64 + ROUNDING {
-                    list.push(Part { name: format!("{word} {name}"), over, rows });
-                }
-            }
-        };
+        }
+    };
     let all: Vec<usize> = (0..n).collect();
     let vibrating: Vec<usize> = (0..n).filter(|&i| p[i].amplitude.metres() > 0.0).collect();
     ends(&AMPLITUDE, "amplitude", &vibrating, &mut list);
@@ -149,7 +146,8 @@ fn left_out_bent(
     let [others, rows] = rows;
     let refit = laplace(rest, &best.members, &best.u, &fitted.basis.select(others), freedom, ROUNDS);
     let shift = recalibration(rest, &refit.u, &refit.prediction).2;
-    let columns = refit.change.at(out, &best.members, &refit.u, &shift).columns(&fitted.basis.select(rows), 0.0);
+    let columns =
+        refit.change.at(out, &best.members, &refit.u, &shift).columns(&fitted.basis.select(rows), 0.0);
     let expected = out.predict(&best.members, &refit.u) + columns * &refit.departure;
     DVector::from_column_slice(&out.lateral) - expected
 }

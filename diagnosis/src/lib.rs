@@ -46,8 +46,8 @@
 pub mod certificates;
 pub mod constants;
 pub mod data;
-pub mod departure;
 pub mod decision;
+pub mod departure;
 pub mod describe;
 pub mod discrepancy;
 pub mod document;

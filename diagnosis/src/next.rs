@@ -103,7 +103,7 @@ fn actions(fitted: &Fitted, decision: &Decision) -> Vec<Experiment> {
     let (a, b) = (&fitted.candidates[leader], &fitted.candidates[second]);
     let mut list = Vec::new();
     for (one, other) in [(a, b), (b, a)] {
-        let thetas = fitted.problem.thetas(&one.best.members, &one.best.u);
+        let thetas = fitted.problem.thetas(&one.best.members, &one.best.by_law().u);
         for (member, theta) in one.best.members.iter().zip(thetas) {
             let Some(check) = member.form().seen_by.filter(|_| !other.effects.contains(&member.effect))
             else {

@@ -213,12 +213,7 @@ fn coarse_starts(problem: &Problem, singles: &[Candidate], loose: &[f64]) -> Vec
 }
 
 /// Pairs grown from the best singles, each with every other effect in each of its laws.
-pub fn pairs(
-    problem: &Problem,
-    singles: &[Candidate],
-    loose: &[f64],
-    basis: &Basis,
-) -> Vec<Candidate> {
+pub fn pairs(problem: &Problem, singles: &[Candidate], loose: &[f64], basis: &Basis) -> Vec<Candidate> {
     let k = &problem.constants;
     let first: Vec<Pair> = coarse_starts(problem, singles, loose)
         .into_par_iter()

@@ -66,7 +66,9 @@ pub fn model(
             Model::Effects(if whole {
                 best.clone()
             } else {
-                laplace(&problem, &best.members, &best.u, &basis, best.freedom, ROUNDS[2])
+                let refit = |e: &Posterior| laplace(&problem, &e.members, &e.u, &basis, e.freedom, ROUNDS[2]);
+                let plain = best.plain.as_deref().map(|plain| Box::new(refit(plain)));
+                Posterior { plain, ..refit(best) }
             })
         }
         (Verdict::Unknown, _) | (_, None) => {
@@ -144,7 +146,11 @@ fn forecast_part(
             for i in 0..n {
                 spread[i] += open.row(i).dot(&columns.row(i)).max(0.0);
             }
-            (plain.clone(), plain + columns * &e.departure, spread)
+            let form = match &e.plain {
+                Some(plain) => out.predict(&plain.members, &plain.u),
+                None => plain.clone(),
+            };
+            (form, plain + columns * &e.departure, spread)
         }
         Ready::Open(w) => {
             let (mean, sd) = w.predict(problem, passes);

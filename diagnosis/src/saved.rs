@@ -20,7 +20,9 @@ impl Diagnosis {
         let best = match self.decision.verdict {
             Verdict::Unknown => return None,
             Verdict::NoGap => &self.fitted.none,
-            Verdict::Named | Verdict::Ambiguous => &self.fitted.candidates[self.decision.class[0]].best,
+            Verdict::Named | Verdict::Ambiguous => {
+                self.fitted.candidates[self.decision.class[0]].best.by_law()
+            }
         };
         let errors = best.members.iter().map(|m| effects::at(m.effect).interpolation_error);
         let gap = &self.report.gap;

@@ -186,7 +186,7 @@ pub fn diagnose(table: &Table, rig: &RigFile, options: &Options, sha256: String)
         },
     };
     let leading = best.filter(|_| decision.verdict != Verdict::NoGap);
-    let parameters = leading.map(|best| estimates(&fitted.problem, best, &fitted.basis));
+    let parameters = leading.map(|best| estimates(&fitted.problem, best.by_law(), &fitted.basis));
     let hypotheses = hypotheses(&fitted, &decision, parameters.as_ref());
     options.progress.at("the next experiment", 0.92);
     let next_experiment = experiments(&fitted, table, rig, &decision);
@@ -358,7 +358,7 @@ fn hypotheses(
             let parameters = if Some(i) == decision.leader() && parameters.is_some() {
                 parameters.map(|p| p.concat()).unwrap_or_default()
             } else {
-                curvature(&fitted.problem, &c.best)
+                curvature(&fitted.problem, c.best.by_law())
             };
             Hypothesis {
                 effects: c.names().iter().map(|n| (*n).to_string()).collect(),

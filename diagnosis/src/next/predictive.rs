@@ -83,12 +83,7 @@ pub fn predictives(
 }
 
 /// Mean and covariance of a fitted hypothesis at a grid: parameters and departure from form, jointly.
-fn expected(
-    fitted: &Fitted,
-    grid: &Problem,
-    basis: &Basis,
-    e: &Posterior,
-) -> (DVector<f64>, DMatrix<f64>) {
+fn expected(fitted: &Fitted, grid: &Problem, basis: &Basis, e: &Posterior) -> (DVector<f64>, DMatrix<f64>) {
     let problem = &fitted.problem;
     let plain = grid.predict(&e.members, &e.u);
     let here = grid.jacobian(&e.members, &e.u, &plain);
@@ -99,8 +94,7 @@ fn expected(
     let mut mean = plain.clone();
     if r > 0 {
         let (_, _, shift) = recalibration(problem, &e.u, &e.prediction);
-        let columns =
-            e.change.at(grid, &e.members, &e.u, &shift).columns(basis, e.freedom.share);
+        let columns = e.change.at(grid, &e.members, &e.u, &shift).columns(basis, e.freedom.share);
         mean += &columns * &e.departure;
         seen.columns_mut(d, r).copy_from(&e.change.columns(&fitted.basis, e.freedom.share));
         planned.columns_mut(d, r).copy_from(&columns);

@@ -92,8 +92,10 @@ pub fn shapes(problem: &Problem, none: &Posterior, scatter: &Scatter) -> Vec<Sha
     let nuisance = DVector::from_column_slice(&none.u[..NUISANCES]);
     let residual = DVector::from_column_slice(&part.lateral) - &prediction + &jacobian * nuisance;
     let grounds = grounds(&part, &jacobian, &residual, scatter.lasting_columns(problem), scatter.slow_cost);
-    let mut list: Vec<Shape> =
-        families(&part, &none.u, &prediction).par_iter().map(|family| weighed(family, &grounds, &residual)).collect();
+    let mut list: Vec<Shape> = families(&part, &none.u, &prediction)
+        .par_iter()
+        .map(|family| weighed(family, &grounds, &residual))
+        .collect();
     list.sort_by(|a, b| b.nats.total_cmp(&a.nats));
     list
 }

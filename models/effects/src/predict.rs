@@ -80,3 +80,45 @@ fn read(
     }
     reading.gain * friction + reading.crosstalk * contact.normal_force + reading.offset_n
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use models::quantity::PeakToPeak;
+
+    /// With the plate still, Coulomb's law says what each input does: L = mu F, read with offset and cross-talk.
+    #[test]
+    fn an_input_beside_its_value_does_what_coulomb_says() {
+        let pass =
+            Condition { amplitude: PeakToPeak::from_metres(0.0), normal_force_n: 0.4, ..Condition::paper() };
+        let baseline =
+            Baseline { mu0: 0.5, normal_stiffness_n_per_m: 3.9e6, lateral_stiffness_n_per_m: 1.5e6 };
+        let design = Design {
+            duration_s: 60.0,
+            reference_load_n: 0.4,
+            reference_speed_m_s: 0.02,
+            reference_frequency_hz: 30e3,
+            reference_temperature_c: 20.0,
+            stroke_m: 0.0,
+            largest_amplitude_m: 2e-6,
+        };
+        let step = 1e-3;
+        let slope = |input| {
+            let [low, high] =
+                [-step, step].map(|s| lateral_force_with(&baseline, &[], (input, s), &pass, &design));
+            (high - low) / (2.0 * step)
+        };
+        let friction = pass.direction.sign() * 0.5;
+        for (input, expected) in [
+            (Input::Friction, friction * 0.4),
+            (Input::Load, friction),
+            (Input::Offset, 1.0),
+            (Input::Crosstalk, 0.4),
+            (Input::Amplitude, 0.0),
+            (Input::Stiffness, 0.0),
+            (Input::Speed, 0.0),
+        ] {
+            assert!((slope(input) - expected).abs() < 1e-6, "{input:?}: {} and {expected}", slope(input));
+        }
+    }
+}
