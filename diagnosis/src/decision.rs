@@ -208,38 +208,25 @@ fn same_said(fitted: &Fitted, leader: usize, rival: usize) -> bool {
 /// A pair that says little more than one of its members alone is that single with a form of its own: its
 /// weight goes to such members, and to singles that do better than they, in proportion to their evidence.
 fn fold_pairs(fitted: &Fitted, probabilities: &mut [f64]) {
-    let problem = &fitted.problem;
-    let k = &problem.constants;
-    // What the stiffnesses took up is gap too.
-    let gap = left(fitted, &fitted.none) + fitted.none.pull();
+    let k = &fitted.problem.constants;
     let candidates = &fitted.candidates;
-    for pair in 0..candidates.len() {
-        let own = &candidates[pair];
-        if own.effects.len() < 2 || probabilities[pair] < LEAST_PROBABILITY {
-            continue;
-        }
-        let own_left = left(fitted, &own.best);
-        let alone: Vec<usize> = (0..candidates.len())
-            .filter(|&i| {
-                let c = &candidates[i];
-                if c.effects.len() != 1 || !own.effects.contains(&c.effects[0]) {
-                    return false;
-                }
-                let gain = own.log_evidence - c.log_evidence;
-                let c_left = left(fitted, &c.best);
-                let scatter = (2.0 * problem.len() as f64).sqrt();
-                let misfit = c_left > k.misfit_sd * scatter;
-                let needed = misfit && own_left < k.pair_halves * c_left && gain > k.pair_nats;
-                // Or the pair leaves nothing that the scatter does not, and the single cause does.
-                let complete = misfit && own_left < k.pair_complete_sd * scatter;
-                let large = 2.0 * gain >= k.pair_gain_share * gap;
-                let pulled = c.best.pull() > own.best.pull() + k.pair_pull_chi2;
-                !(pulled || needed || gain > k.pair_least_nats && (large || complete))
-            })
-            .collect();
+    let judged = |&i: &usize| candidates[i].effects.len() > 1 && probabilities[i] >= LEAST_PROBABILITY;
+    let pairs: Vec<(usize, Vec<usize>)> =
+        (0..candidates.len()).filter(judged).map(|pair| (pair, says_as_much(fitted, pair))).collect();
+    // Partners that the table does not tell apart stand or fall together.
+    let stands = |pair: usize| {
+        let alike = |other: &usize| {
+            let [a, b] = [pair, *other].map(|i| &candidates[i]);
+            a.effects.iter().any(|e| b.effects.contains(e))
+                && (a.log_evidence - b.log_evidence).abs() < k.alias_nats
+        };
+        pairs.iter().filter(|(_, alone)| alone.is_empty()).any(|(other, _)| alike(other))
+    };
+    for (pair, alone) in pairs.iter().filter(|(pair, _)| !stands(*pair)) {
+        let (pair, own) = (*pair, &candidates[*pair]);
         let Some(best) = alone.iter().map(|&i| candidates[i].log_evidence).reduce(f64::max) else { continue };
         // Another single that does better than these is the better short word for what the pair says.
-        let mut heirs = alone;
+        let mut heirs = alone.clone();
         heirs.extend((0..candidates.len()).filter(|&i| {
             let c = &candidates[i];
             c.effects.len() == 1 && !own.effects.contains(&c.effects[0]) && c.log_evidence > best
@@ -252,6 +239,34 @@ fn fold_pairs(fitted: &Fitted, probabilities: &mut [f64]) {
             probabilities[*i] += weight * (e - total).exp();
         }
     }
+}
+
+/// The members of a pair that alone say nearly as much as it does.
+fn says_as_much(fitted: &Fitted, pair: usize) -> Vec<usize> {
+    let problem = &fitted.problem;
+    let k = &problem.constants;
+    // What the stiffnesses took up is gap too.
+    let gap = left(fitted, &fitted.none) + fitted.none.pull();
+    let candidates = &fitted.candidates;
+    let own = &candidates[pair];
+    let own_left = left(fitted, &own.best);
+    let scatter = (2.0 * problem.len() as f64).sqrt();
+    let as_much = |i: &usize| {
+        let c = &candidates[*i];
+        if c.effects.len() != 1 || !own.effects.contains(&c.effects[0]) {
+            return false;
+        }
+        let gain = own.log_evidence - c.log_evidence;
+        let c_left = left(fitted, &c.best);
+        let misfit = c_left > k.misfit_sd * scatter;
+        let needed = misfit && own_left < k.pair_halves * c_left && gain > k.pair_nats;
+        // Or the pair leaves nothing that the scatter does not, and the single cause does.
+        let complete = misfit && own_left < k.pair_complete_sd * scatter;
+        let large = 2.0 * gain >= k.pair_gain_share * gap;
+        let pulled = c.best.pull() > own.best.pull() + k.pair_pull_chi2;
+        !(pulled || needed || gain > k.pair_least_nats && (large || complete))
+    };
+    (0..candidates.len()).filter(as_much).collect()
 }
 
 #[cfg(test)]

@@ -8,7 +8,8 @@
 //! | [`law`] | a base law in place of the spring-slider |
 //! | [`member`], [`fit`], [`layout`], [`least_squares`] | the regression problem of a hypothesis, its vector of parameters, its fit |
 //! | [`gaussian`], [`kernel`] | Gaussian algebra of low rank; smooth functions over the operating space |
-//! | [`evidence`] | marginal likelihood by Laplace's method, with a Gaussian-process departure from the law's form |
+//! | [`departure`] | how a hypothesis may depart from its form: smoothly, and by bending what its cause acts on |
+//! | [`evidence`] | marginal likelihood by Laplace's method, with that departure |
 //! | [`discrepancy`] | the open set: a Gaussian-process discrepancy of the baseline |
 //! | [`starts`], [`singles`], [`pairs`], [`hypotheses`] | global starts; one cause, two causes, all with their probabilities |
 //! | [`left_out`] | extrapolation to left-out regions of the operating space |
