@@ -3,7 +3,7 @@
 
 usage: forest.py SEALED SETS [even|odd]
   SEALED/open/*/{points.csv,rig.toml} and SEALED/sealed/*/label.toml, as
-    cargo run --release -p muprime-sim --example seal -- SEALED 1500 7100000
+    cargo run --release -p muprime-tests --example seal -- SEALED 1500 7100000
   writes them, are what it learns from;
   SETS/*/{train.csv,rig.toml,truth.json} of another generator are what it is tried on, those with such a number.
 

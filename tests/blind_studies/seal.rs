@@ -1,4 +1,4 @@
-//! Writes sealed data sets: `cargo run --release -p muprime-sim --example seal -- FOLDER COUNT FIRST_SEED [STRATUM]`.
+//! Writes sealed data sets: `cargo run --release -p muprime-tests --example seal -- FOLDER COUNT FIRST_SEED [STRATUM]`.
 //!
 //! `FOLDER/open/SEED/` holds what a diagnoser may read, `FOLDER/sealed/SEED/` what only the scorer may. The
 //! stratum is drawn from the seed unless one is named: none, single, pair, alias, outside.
@@ -8,7 +8,7 @@ use std::path::Path;
 use std::process::ExitCode;
 use std::time::Instant;
 
-use muprime_sim::sealed::{Ask, Stratum, generate};
+use sim::sealed::{Ask, Stratum, generate};
 
 fn main() -> ExitCode {
     match run() {

@@ -1,4 +1,4 @@
-//! Lists what the oracle says of sealed sets: `cargo run --release -p muprime-sim --example oracle -- COUNT SEED [STRATUM]`.
+//! Lists what the oracle says of sealed sets: `cargo run --release -p muprime-tests --example oracle -- COUNT SEED [STRATUM]`.
 //!
 //! The seeds are those of `muprime blind --sets COUNT --seed SEED`. One line a set: truth, gain, gap over floor, the
 //! verdict, the three best imitators with what they leave, seconds. STRATUM: single (default) or alias.
@@ -7,7 +7,7 @@
 use std::process::ExitCode;
 use std::time::Instant;
 
-use muprime_sim::sealed::{Ask, Stratum, generate};
+use sim::sealed::{Ask, Stratum, generate};
 
 fn main() -> ExitCode {
     let arguments: Vec<String> = std::env::args().skip(1).collect();

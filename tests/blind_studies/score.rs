@@ -1,4 +1,4 @@
-//! Scores labelled sets on disk: `cargo run --release -p muprime-diagnosis --example score -- FOLDER LINES.json [+NAME=VALUE ...] [NAME=VALUE ...]`.
+//! Scores labelled sets on disk: `cargo run --release -p muprime-tests --example score -- FOLDER LINES.json [+NAME=VALUE ...] [NAME=VALUE ...]`.
 //!
 //! Every folder in `FOLDER` holds `train.csv`, `rig.toml`, `conditions.csv` and `truth.json`: `cause` (names; none for no gap;
 //! `outside the library`), `detectable`, and `hidden` (noise-free force and full friction by point). One line a set goes to
@@ -14,11 +14,11 @@ use std::sync::Arc;
 use std::time::Instant;
 
 use models::pass::read_passes;
-use muprime_diagnosis::constants::Constants;
-use muprime_diagnosis::data::{RigFile, Table};
-use muprime_diagnosis::decision::decide;
-use muprime_diagnosis::hypotheses::Options;
-use muprime_diagnosis::verdict::{Diagnosis, diagnose};
+use diagnosis::constants::Constants;
+use diagnosis::data::{RigFile, Table};
+use diagnosis::decision::decide;
+use diagnosis::hypotheses::Options;
+use diagnosis::verdict::{Diagnosis, diagnose};
 use rayon::prelude::*;
 use serde::{Deserialize, Serialize};
 
@@ -156,7 +156,7 @@ fn score(folder: &Path, options: &Options, changes: &[Constants]) -> Result<Line
         seconds,
         passes: fitted.problem.len(),
         gap_chi2: fitted.problem.misfit(&fitted.none.prediction),
-        shapes: muprime_diagnosis::structure::shapes::nats(&fitted.shapes),
+        shapes: diagnosis::structure::shapes::nats(&fitted.shapes),
         fits: fitted
             .candidates
             .iter()
