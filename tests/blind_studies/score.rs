@@ -13,12 +13,12 @@ use std::path::{Path, PathBuf};
 use std::sync::Arc;
 use std::time::Instant;
 
-use models::pass::read_passes;
 use diagnosis::constants::Constants;
 use diagnosis::data::{RigFile, Table};
 use diagnosis::decision::decide;
 use diagnosis::hypotheses::Options;
 use diagnosis::verdict::{Diagnosis, diagnose};
+use models::pass::read_passes;
 use rayon::prelude::*;
 use serde::{Deserialize, Serialize};
 
