@@ -247,8 +247,9 @@ fn a_saved_model_comes_back() {
     }
 }
 
-/// One cause, whose form departs from the library's so that a second cause mends it: a zero that sinks, which is a function of
-/// time, and attraction that grows with the speed, which the library has. Each is named alone.
+/// One cause, whose form departs from the library's so that a second cause mends it: a zero that sinks,
+/// which is a function of time, and attraction that grows with the speed, which the library has. Each is
+/// named alone.
 #[test]
 fn a_companion_that_may_be_a_form_of_its_own_is_not_named() {
     let cases = [(7_700_023_100_086, "normal_offset"), (7_701_023_103_049, "adhesion")];

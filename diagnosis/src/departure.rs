@@ -1,8 +1,8 @@
 //! How a hypothesis may depart from its form.
 //!
-//! A cause's change may bend smoothly over all covariates, in proportion to itself. And where a cause acts on one input (the
-//! amplitude, say) by a size that is a function of few covariates (of time alone), that function may be any smooth one: the
-//! mechanism stays, the formula goes.
+//! A cause's change may bend smoothly over all covariates, in proportion to itself. And where a cause acts
+//! on one input (the amplitude, say) by a size that is a function of few covariates (of time alone), that
+//! function may be any smooth one: the mechanism stays, the formula goes.
 
 use crate::constants::Constants;
 use crate::evidence::recalibration;
@@ -142,7 +142,8 @@ impl Change {
         Change { net: DVector::zeros(passes), bent: Vec::new() }
     }
 
-    /// By a hypothesis at coordinates where it predicts this; what is bent has the net size of the member's own change.
+    /// By a hypothesis at coordinates where it predicts this; what is bent has the net size of the member's
+    /// own change.
     pub fn by(
         problem: &Problem,
         members: &[Member],
@@ -240,7 +241,8 @@ mod tests {
     use crate::least_squares::minimise;
     use effects::{Baseline, by_name};
 
-    /// A table on which the amplitude falls to half of itself and comes back while the plate passes through its resonance.
+    /// A table on which the amplitude falls to half of itself and comes back while the plate passes through
+    /// its resonance.
     fn through_a_resonance() -> Table {
         let mut table = table(&mut Deviates(5), 0.0);
         let finger = rig().finger;
@@ -262,8 +264,8 @@ mod tests {
         table
     }
 
-    /// The library's detuning falls with time and stays down. Bent over time it follows a plate that comes back; at other
-    /// conditions its departure is what it is at the table's.
+    /// The library's detuning falls with time and stays down. Bent over time it follows a plate that comes
+    /// back; at other conditions its departure is what it is at the table's.
     #[test]
     fn a_detuning_that_comes_back_is_a_detuning() {
         let table = through_a_resonance();

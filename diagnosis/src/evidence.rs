@@ -54,7 +54,8 @@ pub struct Posterior {
 }
 
 impl Posterior {
-    /// The hypothesis by its law: parameters that a rig can use, where the bent one has a function beside them.
+    /// The hypothesis by its law: parameters that a rig can use, where the bent one has a function beside
+    /// them.
     pub fn by_law(&self) -> &Posterior {
         self.plain.as_deref().unwrap_or(self)
     }
@@ -99,8 +100,8 @@ pub fn recalibration(
     (raw, jacobian, shift)
 }
 
-/// Improves a fit under the covariance of one freedom and gives its evidence. `members` may be empty (no gap):
-/// then there is no form uncertainty.
+/// Improves a fit under the covariance of one freedom and gives its evidence. `members` may be empty (no
+/// gap): then there is no form uncertainty.
 pub fn laplace(
     problem: &Problem,
     members: &[Member],

@@ -332,7 +332,8 @@ impl Problem {
         )
     }
 
-    /// Change of the predictions for a unit of an input, as [`effects::Input`] has it, with the hypothesis in force.
+    /// Change of the predictions for a unit of an input, as [`effects::Input`] has it, with the hypothesis
+    /// in force.
     pub fn sensitivity(
         &self,
         members: &[Member],

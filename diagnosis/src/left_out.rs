@@ -134,7 +134,8 @@ fn left_out(rest: &Problem, out: &Problem, members: &[Member], start: &[f64]) ->
     (DVector::from_column_slice(&out.lateral) - expected, refit)
 }
 
-/// The same of a cause whose function of few covariates is bent: what the rest shows of the function is part of the mechanism.
+/// The same of a cause whose function of few covariates is bent: what the rest shows of the function is
+/// part of the mechanism.
 fn left_out_bent(
     fitted: &Fitted,
     best: &Posterior,

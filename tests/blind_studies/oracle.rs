@@ -1,7 +1,9 @@
-//! Lists what the oracle says of sealed sets: `cargo run --release -p muprime-tests --example oracle -- COUNT SEED [STRATUM]`.
+//! Lists what the oracle says of sealed sets: `cargo run --release -p muprime-tests --example oracle --
+//! COUNT SEED [STRATUM]`.
 //!
-//! The seeds are those of `muprime blind --sets COUNT --seed SEED`. One line a set: truth, gain, gap over floor, the
-//! verdict, the three best imitators with what they leave, seconds. STRATUM: single (default) or alias.
+//! The seeds are those of `muprime blind --sets COUNT --seed SEED`. One line a set: truth, gain, gap over
+//! floor, the verdict, the three best imitators with what they leave, seconds. STRATUM: single (default) or
+//! alias.
 #![allow(clippy::disallowed_methods, reason = "it says how long it took")]
 
 use std::process::ExitCode;

@@ -1,8 +1,10 @@
-//! Scores labelled sets on disk: `cargo run --release -p muprime-tests --example score -- FOLDER LINES.json [+NAME=VALUE ...] [NAME=VALUE ...]`.
+//! Scores labelled sets on disk: `cargo run --release -p muprime-tests --example score -- FOLDER LINES.json
+//! [+NAME=VALUE ...] [NAME=VALUE ...]`.
 //!
-//! Every folder in `FOLDER` holds `train.csv`, `rig.toml`, `conditions.csv` and `truth.json`: `cause` (names; none for no gap;
-//! `outside the library`), `detectable`, and `hidden` (noise-free force and full friction by point). One line a set goes to
-//! `LINES.json`, with everything that was fitted; what is printed is their summary.
+//! Every folder in `FOLDER` holds `train.csv`, `rig.toml`, `conditions.csv` and `truth.json`: `cause`
+//! (names; none for no gap; `outside the library`), `detectable`, and `hidden` (noise-free force and full
+//! friction by point). One line a set goes to `LINES.json`, with everything that was fitted; what is
+//! printed is their summary.
 #![allow(clippy::disallowed_methods, reason = "it says how long each set took")]
 #![allow(missing_docs, reason = "a study, not a library")]
 
@@ -48,7 +50,8 @@ struct Line {
     stated: Vec<(Vec<String>, f64)>,
     /// Log evidences beside no gap's.
     evidence: Vec<(String, f64)>,
-    /// Scale of the scatter, shift of runs, size and correlation of what lasts, what it cost, bare scale, structure nats, clustered p, suspects.
+    /// Scale of the scatter, shift of runs, size and correlation of what lasts, what it cost, bare scale,
+    /// structure nats, clustered p, suspects.
     scatter: Vec<f64>,
     closure: f64,
     carrying: usize,

@@ -1,4 +1,5 @@
-//! Writes sealed data sets: `cargo run --release -p muprime-tests --example seal -- FOLDER COUNT FIRST_SEED [STRATUM]`.
+//! Writes sealed data sets: `cargo run --release -p muprime-tests --example seal -- FOLDER COUNT FIRST_SEED
+//! [STRATUM]`.
 //!
 //! `FOLDER/open/SEED/` holds what a diagnoser may read, `FOLDER/sealed/SEED/` what only the scorer may. The
 //! stratum is drawn from the seed unless one is named: none, single, pair, alias, outside.

@@ -285,8 +285,8 @@ mod tests {
     use crate::example::{Deviates, rig, table};
     use crate::least_squares::minimise;
 
-    /// A friction coefficient that rises or falls by a third half way, under vibration: a jump in time of that sign, with
-    /// nearly all of the gap's evidence, though the forces do not rise in proportion.
+    /// A friction coefficient that rises or falls by a third half way, under vibration: a jump in time of
+    /// that sign, with nearly all of the gap's evidence, though the forces do not rise in proportion.
     #[test]
     fn a_jump_of_the_coefficient_has_its_sign_and_its_evidence() {
         for factor in [1.33, 0.7] {

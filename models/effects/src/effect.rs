@@ -170,8 +170,8 @@ impl Parameter {
 
 /// What a cause acts on, and what its size there may be a function of.
 ///
-/// The library's laws are formulae; of many causes a rig knows only this much. A departure that bends what the cause acts on,
-/// over these covariates and no others, keeps the mechanism where the formula fails.
+/// The library's laws are formulae; of many causes a rig knows only this much. A departure that bends what
+/// the cause acts on, over these covariates and no others, keeps the mechanism where the formula fails.
 #[derive(Debug, Clone, Copy)]
 pub struct Acts {
     /// What it acts on.

@@ -86,7 +86,8 @@ mod tests {
     use super::*;
     use models::quantity::PeakToPeak;
 
-    /// With the plate still, Coulomb's law says what each input does: L = mu F, read with offset and cross-talk.
+    /// With the plate still, Coulomb's law says what each input does: L = mu F, read with offset and
+    /// cross-talk.
     #[test]
     fn an_input_beside_its_value_does_what_coulomb_says() {
         let pass =
