@@ -210,9 +210,11 @@ fn same_said(fitted: &Fitted, leader: usize, rival: usize) -> bool {
 fn fold_pairs(fitted: &Fitted, probabilities: &mut [f64]) {
     let k = &fitted.problem.constants;
     let candidates = &fitted.candidates;
+    // What the stiffnesses took up is gap too.
+    let gap = left(fitted, &fitted.none) + fitted.none.pull();
     let judged = |&i: &usize| candidates[i].effects.len() > 1 && probabilities[i] >= LEAST_PROBABILITY;
     let pairs: Vec<(usize, Vec<usize>)> =
-        (0..candidates.len()).filter(judged).map(|pair| (pair, says_as_much(fitted, pair))).collect();
+        (0..candidates.len()).filter(judged).map(|pair| (pair, says_as_much(fitted, pair, gap))).collect();
     // Partners that the table does not tell apart stand or fall together.
     let stands = |pair: usize| {
         let alike = |other: &usize| {
@@ -241,12 +243,10 @@ fn fold_pairs(fitted: &Fitted, probabilities: &mut [f64]) {
     }
 }
 
-/// The members of a pair that alone say nearly as much as it does.
-fn says_as_much(fitted: &Fitted, pair: usize) -> Vec<usize> {
+/// The members of a pair that alone say nearly as much as it does, of a gap of this chi2.
+fn says_as_much(fitted: &Fitted, pair: usize, gap: f64) -> Vec<usize> {
     let problem = &fitted.problem;
     let k = &problem.constants;
-    // What the stiffnesses took up is gap too.
-    let gap = left(fitted, &fitted.none) + fitted.none.pull();
     let candidates = &fitted.candidates;
     let own = &candidates[pair];
     let own_left = left(fitted, &own.best);

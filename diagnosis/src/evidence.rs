@@ -191,8 +191,9 @@ pub fn laplace(
             log_evidence += log_half_line(u[at] / sd, beyond);
         }
     }
-    let columns = change.columns(basis, freedom.share);
-    let departure = covariance.weights(&residual).rows(0, columns.ncols()).into_owned();
+    // The departure's columns come before those of what passes have in common.
+    let weights = covariance.weights(&residual);
+    let departure = weights.rows(0, weights.len() - problem.common.ncols()).into_owned();
     let bent = change.columns(basis, 0.0);
     let mechanism = &m + &bent * departure.rows(0, bent.ncols());
     Posterior {

@@ -147,9 +147,9 @@ fn left_out_bent(
     let [others, rows] = rows;
     let refit = laplace(rest, &best.members, &best.u, &fitted.basis.select(others), freedom, ROUNDS);
     let shift = recalibration(rest, &refit.u, &refit.prediction).2;
-    let columns =
-        refit.change.at(out, &best.members, &refit.u, &shift).columns(&fitted.basis.select(rows), 0.0);
-    let expected = out.predict(&best.members, &refit.u) + columns * &refit.departure;
+    let plain = out.predict(&best.members, &refit.u);
+    let there = refit.change.at(out, &best.members, &refit.u, &plain, &shift);
+    let expected = plain + there.columns(&fitted.basis.select(rows), 0.0) * &refit.departure;
     DVector::from_column_slice(&out.lateral) - expected
 }
 

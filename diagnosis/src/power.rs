@@ -49,7 +49,7 @@ fn one(fitted: &Fitted, candidate: &Candidate, threshold: f64) -> SeenFrom {
 }
 
 fn by_law(fitted: &Fitted, law: &Posterior, threshold: f64) -> SeenFrom {
-    let problem = &fitted.problem;
+    let (problem, law) = (&fitted.problem, law.by_law());
     let (member, place) = (law.members[0], Layout::of(&law.members).size(0));
     let parameter = member.parameters(&problem.design)[0];
     let change = |size: f64| {

@@ -139,8 +139,8 @@ fn forecast_part(
         }
         Ready::Effects { best: e, shift, departure } => {
             let plain = out.predict(&e.members, &e.u);
-            let change = e.change.at(&out, &e.members, &e.u, shift);
-            let columns = change.columns(&fitted.kernels.at(passes), e.freedom.share);
+            let change = e.change.at(&out, &e.members, &e.u, &plain, shift);
+            let columns = change.columns(&fitted.kernels.for_members(passes, &e.members), e.freedom.share);
             let mut spread = parameter_variance(&out, e, &plain);
             let open = &columns * departure;
             for i in 0..n {
@@ -180,7 +180,8 @@ fn parameter_variance(out: &Problem, e: &Posterior, at: &DVector<f64>) -> Vec<f6
 
 /// Posterior covariance of the departure's weights.
 fn departure_covariance(fitted: &Fitted, problem: &Problem, e: &Posterior) -> DMatrix<f64> {
-    let phi = e.change.columns(&fitted.kernels.at(&problem.passes), e.freedom.share);
+    let basis = fitted.kernels.for_members(&problem.passes, &e.members);
+    let phi = e.change.columns(&basis, e.freedom.share);
     let r = phi.ncols();
     let gram =
         problem.covariance(&DMatrix::zeros(problem.len(), 0)).inner(&phi, &phi) + DMatrix::identity(r, r);

@@ -94,7 +94,7 @@ fn expected(fitted: &Fitted, grid: &Problem, basis: &Basis, e: &Posterior) -> (D
     let mut mean = plain.clone();
     if r > 0 {
         let (_, _, shift) = recalibration(problem, &e.u, &e.prediction);
-        let columns = e.change.at(grid, &e.members, &e.u, &shift).columns(basis, e.freedom.share);
+        let columns = e.change.at(grid, &e.members, &e.u, &plain, &shift).columns(basis, e.freedom.share);
         mean += &columns * &e.departure;
         seen.columns_mut(d, r).copy_from(&e.change.columns(&fitted.basis, e.freedom.share));
         planned.columns_mut(d, r).copy_from(&columns);
