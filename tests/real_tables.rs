@@ -132,8 +132,8 @@ fn predicted(table: &str, held: impl Fn(usize, usize) -> bool, what: &str) -> He
     for (point, forecast) in conditions.points.iter().zip(result.predict(&conditions)) {
         let force = hidden.iter().find(|p| p.point == *point).unwrap().lateral_force_n.unwrap();
         before += ((forecast.baseline - force) / force).powi(2);
-        after += ((forecast.corrected - force) / force).powi(2);
-        inside += f64::from((forecast.corrected - force).abs() <= 1.96 * forecast.corrected_sd);
+        after += ((forecast.in_run - force) / force).powi(2);
+        inside += f64::from((forecast.in_run - force).abs() <= 1.96 * forecast.in_run_sd);
     }
     let n = hidden.len() as f64;
     let held_out = HeldOut { before: (before / n).sqrt(), after: (after / n).sqrt(), coverage: inside / n };

@@ -204,6 +204,11 @@ impl Change {
         Change { net, bent: bent.collect() }
     }
 
+    /// Whether an effect is bent.
+    pub fn bends(&self, effect: usize) -> bool {
+        self.bent.iter().any(|b| b.effect == effect)
+    }
+
     /// Whether something is bent over this covariate.
     pub fn bends_over(&self, covariate: &Covariate) -> bool {
         let over = |b: &Bent| effects::at(b.effect).acts.map_or(&[][..], |acts| acts.over);

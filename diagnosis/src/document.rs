@@ -28,13 +28,15 @@ pub fn document(result: &Diagnosis, rig: &RigFile, damage: &[String]) -> serde_j
 /// What `--predictions` holds: CSV, a row a condition; empty cells where the base law cannot tell.
 pub fn predictions(result: &Diagnosis, conditions: &Table) -> String {
     let mut text = String::from(
-        "point,lateral_force_baseline_n,lateral_force_corrected_n,lateral_force_corrected_sd_n\n",
+        "point,lateral_force_baseline_n,lateral_force_corrected_n,lateral_force_corrected_sd_n,\
+         lateral_force_in_run_n,lateral_force_in_run_sd_n\n",
     );
     for (point, f) in conditions.points.iter().zip(result.predict(conditions)) {
         let cells = if f.baseline.is_nan() {
-            ",,".to_string()
+            ",,,,".to_string()
         } else {
-            format!("{:e},{:e},{:e}", f.baseline, f.corrected, f.corrected_sd)
+            let cells = [f.baseline, f.corrected, f.corrected_sd, f.in_run, f.in_run_sd];
+            cells.map(|c| format!("{c:e}")).join(",")
         };
         text.push_str(&format!("{point},{cells}\n"));
     }

@@ -3,8 +3,6 @@
 mod partition;
 
 use crate::data::RigFile;
-use crate::evidence::Posterior;
-use crate::fit::Problem;
 use crate::fitted::Fitted;
 use crate::predict::{Forecast, Model, forecast};
 use effects::Place;
@@ -56,7 +54,7 @@ const LEAST_PASSES: f64 = 3.0;
 /// fitted to the passes alone would end where the next pass happens to be. A condition counts by its
 /// probability of standing out. The space is cut into parts, each time where that probability differs most.
 /// The named parts are those that together have the largest expected F1.
-pub fn regions(fitted: &Fitted, rig: &RigFile, model: &(Model, Problem, Posterior)) -> Vec<Region> {
+pub fn regions(fitted: &Fitted, rig: &RigFile, model: &Model) -> Vec<Region> {
     let problem = &fitted.problem;
     let n = problem.len();
     let mut places = problem.passes.clone();

@@ -8,9 +8,8 @@
 //! later times the worst.
 
 use crate::data::{RigFile, Table};
-use crate::decision::Verdict;
 use crate::fitted::Fitted;
-use crate::predict::{Forecast, forecast, model};
+use crate::predict::{Answer, Forecast, forecast, model};
 use rayon::prelude::*;
 use statrs::distribution::{ContinuousCDF, StudentsT};
 
@@ -27,7 +26,7 @@ pub fn widened(
     fitted: &Fitted,
     table: &Table,
     rig: &RigFile,
-    (verdict, leader): (Verdict, Option<usize>),
+    answer: &Answer,
     conditions: &Table,
     mut forecasts: Vec<Forecast>,
 ) -> Vec<Forecast> {
@@ -36,14 +35,16 @@ pub fn widened(
     let later = |i: usize| conditions.passes[i].time_s > end;
     let rows = || 0..conditions.len();
     let measure = |parts: Vec<Vec<usize>>| -> Vec<Misses> {
-        parts.par_iter().filter_map(|out| misses(fitted, table, rig, (verdict, leader), out)).collect()
+        parts.par_iter().filter_map(|out| misses(fitted, table, rig, answer, out)).collect()
     };
     let of_run = if rows().any(strange) { Misses::of_another(&measure(runs(table))) } else { STATED };
     let of_time = if rows().any(later) { Misses::at_worst(&measure(ends(table))) } else { STATED };
     for (i, f) in forecasts.iter_mut().enumerate() {
         let own = if strange(i) { of_run } else { STATED };
         let own = if later(i) { own.worst(of_time) } else { own };
-        f.corrected_sd = (own.factor * f.corrected_sd).max(own.share * f.corrected.abs());
+        let wide = |mean: f64, sd: f64| (own.factor * sd).max(own.share * mean.abs());
+        f.corrected_sd = wide(f.corrected, f.corrected_sd);
+        f.in_run_sd = wide(f.in_run, f.in_run_sd);
     }
     forecasts
 }
@@ -96,18 +97,12 @@ fn ends(table: &Table) -> Vec<Vec<usize>> {
 }
 
 /// How far the passes left out lie from their prediction; none where too few are left, or out.
-fn misses(
-    fitted: &Fitted,
-    table: &Table,
-    rig: &RigFile,
-    (verdict, leader): (Verdict, Option<usize>),
-    out: &[usize],
-) -> Option<Misses> {
+fn misses(fitted: &Fitted, table: &Table, rig: &RigFile, answer: &Answer, out: &[usize]) -> Option<Misses> {
     let rest: Vec<usize> = (0..table.len()).filter(|i| out.binary_search(i).is_err()).collect();
     if rest.len() < LEAST[0] || out.len() < LEAST[1] {
         return None;
     }
-    let fit = model(fitted, table, verdict, leader, Some(&rest));
+    let fit = model(fitted, table, answer, Some(&rest));
     let passes: Vec<_> = out.iter().map(|&i| table.passes[i]).collect();
     let forecasts = forecast(fitted, rig, &fit, &passes);
     let held = |unit: &dyn Fn(&Forecast) -> f64| {

@@ -9,6 +9,7 @@ use crate::fit::Problem;
 use crate::fitted::Fitted;
 use crate::layout::NUISANCES;
 use crate::least_squares::minimise;
+use crate::structure::laid::Laid;
 use models::condition::Condition;
 use nalgebra::{DMatrix, DVector};
 use rayon::prelude::*;
@@ -20,7 +21,7 @@ pub struct Forecast {
     pub baseline: f64,
     /// Of the recalibrated baseline.
     pub recalibrated: f64,
-    /// Of the verdict's model.
+    /// Of the verdict's model, whose runs have no shift.
     pub corrected: f64,
     /// Of the named effects in the library's form alone, without the smooth departure from it.
     pub form: f64,
@@ -28,26 +29,96 @@ pub struct Forecast {
     pub corrected_sd: f64,
     /// The pass scatter in it.
     pub scatter_sd: f64,
+    /// What a sensor would read there: `corrected` with the shift of the condition's run, where the table has
+    /// that run, and with what lasts of the passes about it.
+    pub in_run: f64,
+    /// Predictive standard deviation of `in_run`.
+    pub in_run_sd: f64,
 }
 
-/// The model behind a verdict, fitted to some rows of a table.
-pub enum Model {
-    /// The recalibrated baseline.
-    Baseline(Posterior),
-    /// Effects with their smooth departure from form.
-    Effects(Posterior),
-    /// The open set.
-    Open(Box<Discrepancy>),
+/// A hypothesis that predicts.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+enum Which {
+    Baseline,
+    Cause(usize),
+    Open,
+    Shape(usize),
 }
 
-/// The model of a verdict on some rows (all of them for predictions), starting from the fit to the whole.
-pub fn model(
-    fitted: &Fitted,
-    table: &Table,
-    verdict: Verdict,
+/// By which hypotheses an answer predicts, with weights that sum to one.
+#[derive(Debug, Clone)]
+pub struct Answer {
+    parts: Vec<(f64, Which)>,
+    /// The cause whose law alone is [`Forecast::form`]; none where the whole is.
     leader: Option<usize>,
-    rows: Option<&[usize]>,
-) -> (Model, Problem, Posterior) {
+}
+
+/// Most hypotheses that a mean is of, and the least weight of one beside the largest.
+const AVERAGED: usize = 3;
+const LEAST_WEIGHT: f64 = 0.1;
+
+impl Answer {
+    /// One cause or pair, by its place among the candidates.
+    pub fn cause(candidate: usize) -> Self {
+        Answer { parts: vec![(1.0, Which::Cause(candidate))], leader: Some(candidate) }
+    }
+
+    /// Of a verdict: `no_gap` predicts by the baseline and `named` by what is named. Under `ambiguous` and
+    /// `unknown` the table does not say by which, and predictions are the mean over causes, the open set and
+    /// shapes, by their tempered evidence.
+    pub fn of(fitted: &Fitted, verdict: Verdict, leader: Option<usize>) -> Self {
+        match (verdict, leader) {
+            (Verdict::NoGap, _) => Answer { parts: vec![(1.0, Which::Baseline)], leader: None },
+            (Verdict::Named, Some(leader)) => Answer::cause(leader),
+            (Verdict::Unknown, _) => Answer { parts: averaged(fitted), leader: None },
+            (_, leader) => Answer { parts: averaged(fitted), leader },
+        }
+    }
+}
+
+fn averaged(fitted: &Fitted) -> Vec<(f64, Which)> {
+    let none = fitted.none.log_evidence;
+    let causes = fitted.candidates.iter().enumerate();
+    let shapes = fitted.shapes.iter().enumerate();
+    let mut all: Vec<(f64, Which)> = causes
+        .map(|(i, c)| (c.log_evidence - none, Which::Cause(i)))
+        .chain(shapes.map(|(i, s)| (s.nats, Which::Shape(i))))
+        .chain([(fitted.discrepancy.log_evidence - none, Which::Open)])
+        .collect();
+    all.sort_by(|a, b| b.0.total_cmp(&a.0));
+    all.truncate(AVERAGED);
+    let best = all[0].0;
+    all.iter_mut().for_each(|(nats, _)| *nats = ((*nats - best) / fitted.problem.constants.temper).exp());
+    all.retain(|(weight, _)| *weight >= LEAST_WEIGHT);
+    let total: f64 = all.iter().map(|(weight, _)| weight).sum();
+    all.iter_mut().for_each(|(weight, _)| *weight /= total);
+    all
+}
+
+/// The model behind an answer, fitted to some rows of a table.
+pub struct Model {
+    problem: Problem,
+    baseline: Posterior,
+    /// Weights and hypotheses.
+    parts: Vec<(f64, Part)>,
+    /// The law of the leader, where there is one.
+    law: Option<Posterior>,
+}
+
+enum Part {
+    Baseline,
+    /// With the recalibration that imitates the effect best, and the covariance of the departure's weights.
+    Effects {
+        best: Box<Posterior>,
+        shift: DVector<f64>,
+        departure: DMatrix<f64>,
+    },
+    Open(Box<Discrepancy>),
+    Shape(Box<Laid>),
+}
+
+/// The model of an answer on some rows (all of them for predictions), starting from the fit to the whole.
+pub fn model(fitted: &Fitted, table: &Table, answer: &Answer, rows: Option<&[usize]>) -> Model {
     let all: Vec<usize> = (0..fitted.problem.len()).collect();
     let rows = rows.unwrap_or(&all);
     let whole = rows.len() == fitted.problem.len();
@@ -59,25 +130,27 @@ pub fn model(
         let fit = minimise(&problem, &[], &fitted.none.u, &problem.variance, ROUNDS[0]);
         laplace(&problem, &[], &fit.u, &basis, Freedom::NONE, ROUNDS[1])
     };
-    let model = match (verdict, leader) {
-        (Verdict::NoGap, _) => Model::Baseline(baseline.clone()),
-        (Verdict::Named | Verdict::Ambiguous, Some(leader)) => {
-            let best = &fitted.candidates[leader].best;
-            Model::Effects(if whole {
-                best.clone()
-            } else {
-                let refit = |e: &Posterior| laplace(&problem, &e.members, &e.u, &basis, e.freedom, ROUNDS[2]);
-                let plain = best.plain.as_deref().map(|plain| Box::new(refit(plain)));
-                Posterior { plain, ..refit(best) }
-            })
+    let refit = |e: &Posterior| {
+        if whole { e.clone() } else { laplace(&problem, &e.members, &e.u, &basis, e.freedom, ROUNDS[2]) }
+    };
+    let part = |which: Which| match which {
+        Which::Baseline => Part::Baseline,
+        Which::Cause(i) => {
+            let best = Box::new(refit(&fitted.candidates[i].best));
+            let shift = recalibration(&problem, &best.u, &best.prediction).2;
+            let departure = departure_covariance(fitted, &problem, &best);
+            Part::Effects { best, shift, departure }
         }
-        (Verdict::Unknown, _) | (_, None) => {
+        Which::Open => {
             let part = table.select(rows);
             let lengths = lengths(&problem.constants, &part);
-            Model::Open(Box::new(Discrepancy::fit(&part, &problem, &baseline.u, &lengths)))
+            Part::Open(Box::new(Discrepancy::fit(&part, &problem, &baseline.u, &lengths)))
         }
+        Which::Shape(i) => Part::Shape(Box::new(Laid::fit(&fitted.shapes[i], &problem, &baseline))),
     };
-    (model, problem, baseline)
+    let parts = answer.parts.iter().map(|(weight, which)| (*weight, part(*which))).collect();
+    let law = answer.leader.map(|leader| refit(fitted.candidates[leader].best.by_law()));
+    Model { parts, law, problem, baseline }
 }
 
 /// Rounds of a refit to some rows: of the baseline by least squares, of its mode, and of the effects' mode.
@@ -86,88 +159,71 @@ const ROUNDS: [usize; 3] = [6, 1, 3];
 const PART: usize = 256;
 
 /// Predicts conditions.
-pub fn forecast(
-    fitted: &Fitted,
-    rig: &RigFile,
-    model: &(Model, Problem, Posterior),
-    passes: &[Condition],
-) -> Vec<Forecast> {
-    let (model, problem, baseline) = model;
-    let ready = match model {
-        Model::Baseline(e) => Ready::Baseline(e),
-        Model::Effects(e) => Ready::Effects {
-            best: e,
-            shift: recalibration(problem, &e.u, &e.prediction).2,
-            departure: departure_covariance(fitted, problem, e),
-        },
-        Model::Open(w) => Ready::Open(w),
-    };
-    passes
-        .par_chunks(PART)
-        .flat_map_iter(|part| forecast_part(fitted, rig, &ready, problem, baseline, part))
-        .collect()
+pub fn forecast(fitted: &Fitted, rig: &RigFile, model: &Model, passes: &[Condition]) -> Vec<Forecast> {
+    passes.par_chunks(PART).flat_map_iter(|part| forecast_part(fitted, rig, model, part)).collect()
 }
 
-/// A model with what is the same for all conditions.
-enum Ready<'a> {
-    Baseline(&'a Posterior),
-    /// With the recalibration that imitates the effect best, and the covariance of the departure's weights.
-    Effects {
-        best: &'a Posterior,
-        shift: DVector<f64>,
-        departure: DMatrix<f64>,
-    },
-    Open(&'a Discrepancy),
-}
-
-fn forecast_part(
-    fitted: &Fitted,
-    rig: &RigFile,
-    model: &Ready<'_>,
-    problem: &Problem,
-    baseline: &Posterior,
-    passes: &[Condition],
-) -> Vec<Forecast> {
-    let n = passes.len();
-    let out = problem.at(passes);
-    let nominal = out.predict(&[], &[0.0; NUISANCES]);
-    let recalibrated = out.predict(&[], &baseline.u);
-    let (form, corrected, spread): (DVector<f64>, DVector<f64>, Vec<f64>) = match model {
-        Ready::Baseline(e) => {
-            let spread = parameter_variance(&out, e, &recalibrated);
-            (recalibrated.clone(), recalibrated.clone(), spread)
-        }
-        Ready::Effects { best: e, shift, departure } => {
-            let plain = out.predict(&e.members, &e.u);
-            let change = e.change.at(&out, &e.members, &e.u, &plain, shift);
-            let columns = change.columns(&fitted.kernels.for_members(passes, &e.members), e.freedom.share);
-            let mut spread = parameter_variance(&out, e, &plain);
-            let open = &columns * departure;
-            for i in 0..n {
-                spread[i] += open.row(i).dot(&columns.row(i)).max(0.0);
+impl Part {
+    /// Forces and their variances without scatter, N and N^2.
+    fn predict(
+        &self,
+        fitted: &Fitted,
+        model: &Model,
+        out: &Problem,
+        recalibrated: &DVector<f64>,
+    ) -> (DVector<f64>, Vec<f64>) {
+        match self {
+            Part::Baseline => (recalibrated.clone(), parameter_variance(out, &model.baseline, recalibrated)),
+            Part::Effects { best: e, shift, departure } => {
+                let plain = out.predict(&e.members, &e.u);
+                let change = e.change.at(out, &e.members, &e.u, &plain, shift);
+                let basis = fitted.kernels.for_members(&out.passes, &e.members);
+                let columns = change.columns(&basis, e.freedom.share);
+                let mut spread = parameter_variance(out, e, &plain);
+                let open = &columns * departure;
+                for (i, s) in spread.iter_mut().enumerate() {
+                    *s += open.row(i).dot(&columns.row(i)).max(0.0);
+                }
+                (plain + columns * &e.departure, spread)
             }
-            let form = match &e.plain {
-                Some(plain) => out.predict(&plain.members, &plain.u),
-                None => plain.clone(),
-            };
-            (form, plain + columns * &e.departure, spread)
+            Part::Open(w) => {
+                let (mean, sd) = w.predict(&model.problem, &out.passes);
+                (DVector::from_vec(mean), sd.iter().map(|s| s * s).collect())
+            }
+            Part::Shape(laid) => laid.predict(out),
         }
-        Ready::Open(w) => {
-            let (mean, sd) = w.predict(problem, passes);
-            let mean = DVector::from_vec(mean);
-            (mean.clone(), mean, sd.iter().map(|s| s * s).collect())
-        }
+    }
+}
+
+fn forecast_part(fitted: &Fitted, rig: &RigFile, model: &Model, passes: &[Condition]) -> Vec<Forecast> {
+    let n = passes.len();
+    let out = model.problem.at(passes);
+    let nominal = out.predict(&[], &[0.0; NUISANCES]);
+    let recalibrated = out.predict(&[], &model.baseline.u);
+    let each: Vec<(f64, (DVector<f64>, Vec<f64>))> =
+        model.parts.iter().map(|(w, part)| (*w, part.predict(fitted, model, &out, &recalibrated))).collect();
+    // A mixture: its variance holds how far its parts lie from each other.
+    let mut corrected = DVector::zeros(n);
+    each.iter().for_each(|(w, (mean, _))| corrected += mean * *w);
+    let spread = |i: usize| -> f64 {
+        each.iter().map(|(w, (mean, variance))| w * (variance[i] + (mean[i] - corrected[i]).powi(2))).sum()
     };
+    let form = model.law.as_ref().map_or_else(|| corrected.clone(), |e| out.predict(&e.members, &e.u));
     let level: Vec<f64> = corrected.iter().copied().collect();
-    let scatter = fitted.scatter_of_a_pass(&out, rig, &baseline.u, &level);
+    let scatter = fitted.scatter_of_a_pass(&out, rig, &model.baseline.u, &level);
     (0..n)
-        .map(|i| Forecast {
-            baseline: nominal[i],
-            recalibrated: recalibrated[i],
-            corrected: corrected[i],
-            form: form[i],
-            corrected_sd: (spread[i] + scatter[i] + out.law_variance(i)).sqrt(),
-            scatter_sd: scatter[i].sqrt(),
+        .map(|i| {
+            let sd = (spread(i) + scatter[i] + out.law_variance(i)).sqrt();
+            Forecast {
+                baseline: nominal[i],
+                recalibrated: recalibrated[i],
+                corrected: corrected[i],
+                form: form[i],
+                corrected_sd: sd,
+                scatter_sd: scatter[i].sqrt(),
+                in_run: corrected[i],
+                in_run_sd: sd,
+            }
         })
         .collect()
 }

@@ -91,15 +91,48 @@ pub fn of_table(fitted: &Fitted, table: &Table, decision: &Decision) -> Vec<Stri
     }));
     remarks.extend(together(table));
     remarks.extend(two_levels(fitted, table, decision));
-    let silent: Vec<&str> = decision.regions.iter().filter(|r| !r.judges).map(|r| r.name.as_str()).collect();
-    if !silent.is_empty() {
-        remarks.push(format!(
-            "Without {} the rest of the table tells nothing of the leading cause, so these regions do not judge it. \
-             A further level would.",
-            silent.join(", ")
-        ));
-    }
+    remarks.extend(silent_regions(fitted, decision));
+    remarks.extend(bent(fitted, decision));
     remarks
+}
+
+/// Left-out regions that do not judge the leading cause, and why.
+fn silent_regions(fitted: &Fitted, decision: &Decision) -> Option<String> {
+    let list = decision.regions.iter().filter(|r| !r.judges);
+    let silent: Vec<&str> = list.map(|r| r.name.as_str()).collect();
+    let bent = decision.leader().is_some_and(|l| !fitted.candidates[l].best.change.bent.is_empty());
+    let why = if bent {
+        "the size of the leading cause may be any smooth function there, or the rest of the table tells nothing of it"
+    } else {
+        "the rest of the table tells nothing of the leading cause"
+    };
+    let regions = silent.join(", ");
+    (!silent.is_empty())
+        .then(|| format!("Without {regions} {why}, so these regions do not judge it. A further level would."))
+}
+
+/// Nats by which a bent cause must explain the table better than its law for the law to be called another.
+const BENT_NATS: f64 = 5.0;
+
+/// Says of a named cause whose law is not the rig's that it is not.
+fn bent(fitted: &Fitted, decision: &Decision) -> Option<String> {
+    let led = matches!(decision.verdict, Verdict::Named | Verdict::Ambiguous);
+    let leader = &fitted.candidates[decision.leader().filter(|_| led)?];
+    let nats = leader.best.log_evidence - leader.best.plain.as_ref()?.log_evidence;
+    let of = leader.best.members.iter().filter(|m| leader.best.change.bends(m.effect)).map(|m| {
+        let effect = effects::at(m.effect);
+        let over: Vec<&str> = effect.acts.map_or(&[][..], |acts| acts.over).iter().map(|c| c.words).collect();
+        format!("{} as a function of {}", effect.name.replace('_', " "), over.join(" and "))
+    });
+    let of: Vec<String> = of.collect();
+    (nats > BENT_NATS).then(|| {
+        format!(
+            "The law of the library is not that of the rig: another form of {} explains the table better, by {nats:.0} \
+             nats. Predictions follow that form. Parameters, their intervals and the saved model are those of the \
+             library's law.",
+            of.join(" and of ")
+        )
+    })
 }
 
 /// Share of a covariate's range that parts two levels of it.

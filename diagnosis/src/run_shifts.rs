@@ -6,8 +6,8 @@ use crate::fitted::Fitted;
 use crate::predict::Forecast;
 use nalgebra::{DMatrix, DVector};
 
-/// Adds to forecasts in known runs how far the passes about them lie from the model, and takes that spread
-/// out of them.
+/// Says of forecasts in known runs how far the passes about them lie from the model: what a sensor would read
+/// there. What the model says stays: the shift of a run is no part of a cause.
 ///
 /// `fitted_passes` are the forecasts of the table's own passes. Given the model's mean, what passes have in
 /// common is Gaussian with the prior that was estimated. Its slow columns are read between the passes before
@@ -43,10 +43,9 @@ pub fn shifted(
             row[first + run] = sd * f.recalibrated;
             unknown += (sd * f.corrected).powi(2);
         }
-        f.corrected += weights.dot(&row);
+        f.in_run = f.corrected + weights.dot(&row);
         let rest = (f.corrected_sd.powi(2) - unknown).max(0.0) + covariance.posterior_variance(&row);
-        f.corrected_sd = rest.sqrt();
-        f.scatter_sd = (f.scatter_sd.powi(2) - unknown).max(0.0).sqrt();
+        f.in_run_sd = rest.sqrt();
     }
 }
 
@@ -61,4 +60,35 @@ fn neighbours(table: &Table, run: usize, time_s: f64) -> Option<(usize, usize, f
     let span = time(after) - time(before);
     let share = if span > 0.0 { ((time_s - time(before)) / span).clamp(0.0, 1.0) } else { 0.0 };
     Some((before, after, share))
+}
+
+#[cfg(test)]
+mod tests {
+    use crate::decision::Verdict;
+    use crate::example::{Deviates, rig, table};
+    use crate::hypotheses::Options;
+    use crate::verdict::diagnose;
+
+    /// Three runs of which one reads 12 % more, no other gap: what the verdict's model says is the recalibrated
+    /// baseline, and a sensor in that run reads more.
+    #[test]
+    fn the_shift_of_a_run_is_no_part_of_the_verdicts_model() {
+        let mut table = table(&mut Deviates(11), 0.0);
+        table.run_count = 3;
+        for i in 0..table.len() {
+            table.runs[i] = i / 12;
+            table.lateral[i] *= [1.0, 1.12, 1.0][i / 12];
+        }
+        let result = diagnose(&table, &rig(), &Options::default(), String::new());
+        assert_eq!(result.report.verdict, Verdict::NoGap, "{}", result.report.text);
+        let forecasts = result.predict(&table);
+        let mut missed = [0.0; 2];
+        for (i, f) in forecasts.iter().enumerate() {
+            assert_eq!(f.corrected, f.recalibrated);
+            assert!(f.in_run_sd < f.corrected_sd);
+            missed[0] += (table.lateral[i] - f.corrected).powi(2);
+            missed[1] += (table.lateral[i] - f.in_run).powi(2);
+        }
+        assert!(missed[1] < 0.5 * missed[0], "{missed:?}");
+    }
 }

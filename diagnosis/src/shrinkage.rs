@@ -1,10 +1,9 @@
 //! How far the gap shrinks on passes held out by group.
 
 use crate::data::{RigFile, Table};
-use crate::decision::Verdict;
 use crate::draws::{deviate, split_mix};
 use crate::fitted::Fitted;
-use crate::predict::{forecast, model};
+use crate::predict::{Answer, forecast, model};
 use models::covariate;
 use rayon::prelude::*;
 use serde::Serialize;
@@ -75,8 +74,8 @@ pub fn groups(table: &Table, folds: usize) -> Vec<usize> {
     group
 }
 
-/// Errors on held-out passes under the verdict's model.
-pub fn gap(fitted: &Fitted, table: &Table, rig: &RigFile, verdict: Verdict, leader: Option<usize>) -> Gap {
+/// Errors on held-out passes under the answer's model.
+pub fn gap(fitted: &Fitted, table: &Table, rig: &RigFile, answer: &Answer) -> Gap {
     let k = &fitted.problem.constants;
     let groups = groups(table, k.folds);
     let full = fitted.problem.full_friction();
@@ -89,7 +88,7 @@ pub fn gap(fitted: &Fitted, table: &Table, rig: &RigFile, verdict: Verdict, lead
             if out.is_empty() || rest.len() < LEAST_KEPT {
                 return Vec::new();
             }
-            let fit = model(fitted, table, verdict, leader, Some(&rest));
+            let fit = model(fitted, table, answer, Some(&rest));
             let passes: Vec<_> = out.iter().map(|&i| table.passes[i]).collect();
             forecast(fitted, rig, &fit, &passes)
                 .iter()

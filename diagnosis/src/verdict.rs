@@ -11,7 +11,7 @@ use crate::next::{Experiment, experiments};
 use crate::noise::PureError;
 use crate::novelty::widened;
 use crate::power::{SeenFrom, seen_from};
-use crate::predict::{Forecast, forecast, model};
+use crate::predict::{Answer, Forecast, forecast, model};
 use crate::pulls::{Pull, pulls};
 use crate::remarks::{WithSuspects, of_scatter, of_table, with_suspects};
 use crate::run_shifts::shifted;
@@ -176,13 +176,14 @@ pub fn diagnose(table: &Table, rig: &RigFile, options: &Options, sha256: String)
     options.progress.at("passes held out", 0.85);
     let leader = decision.leader();
     let best = leader.map(|l| &fitted.candidates[l].best);
-    let gap = gap(&fitted, table, rig, decision.verdict, leader);
+    let answer = Answer::of(&fitted, decision.verdict, leader);
+    let gap = gap(&fitted, table, rig, &answer);
     let location = Where {
         place: ledger(&fitted, &decision.probabilities, decision.unknown),
         regions: if decision.verdict == Verdict::NoGap {
             Vec::new()
         } else {
-            regions(&fitted, rig, &model(&fitted, table, decision.verdict, leader, None))
+            regions(&fitted, rig, &model(&fitted, table, &answer, None))
         },
     };
     let leading = best.filter(|_| decision.verdict != Verdict::NoGap);
@@ -413,10 +414,15 @@ impl Diagnosis {
         self.report.record = Some(part);
     }
 
+    /// By which hypotheses the verdict predicts.
+    pub fn answer(&self) -> Answer {
+        Answer::of(&self.fitted, self.decision.verdict, self.decision.leader())
+    }
+
     /// What the verdict's model says of conditions that lie within the table: a curve for a figure. Unlike
     /// [`Self::predict`] it does not ask in which run they are.
     pub fn curve(&self, passes: &[Condition]) -> Vec<Forecast> {
-        let whole = model(&self.fitted, &self.table, self.decision.verdict, self.decision.leader(), None);
+        let whole = model(&self.fitted, &self.table, &self.answer(), None);
         forecast(&self.fitted, &self.rig, &whole, passes)
     }
 
@@ -424,18 +430,18 @@ impl Diagnosis {
     /// `None` for no gap, for the open set, and for what was not fitted.
     pub fn hypothesis_curve(&self, effects: &[String], passes: &[Condition]) -> Option<Vec<Forecast>> {
         let candidate = self.fitted.candidates.iter().position(|c| c.names() == effects)?;
-        let whole = model(&self.fitted, &self.table, Verdict::Named, Some(candidate), None);
+        let whole = model(&self.fitted, &self.table, &Answer::cause(candidate), None);
         Some(forecast(&self.fitted, &self.rig, &whole, passes))
     }
 
     /// Predicts conditions with the verdict's model; those in runs that the table does not have, or after its
     /// end, with the deviations that such passes of the table needed.
     pub fn predict(&self, conditions: &Table) -> Vec<Forecast> {
-        let answer = (self.decision.verdict, self.decision.leader());
-        let whole = model(&self.fitted, &self.table, answer.0, answer.1, None);
+        let answer = self.answer();
+        let whole = model(&self.fitted, &self.table, &answer, None);
         let mut plain = forecast(&self.fitted, &self.rig, &whole, &conditions.passes);
         let own = forecast(&self.fitted, &self.rig, &whole, &self.table.passes);
         shifted(&self.fitted, &self.table, &own, conditions, &mut plain);
-        widened(&self.fitted, &self.table, &self.rig, answer, conditions, plain)
+        widened(&self.fitted, &self.table, &self.rig, &answer, conditions, plain)
     }
 }

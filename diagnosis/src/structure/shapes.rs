@@ -47,6 +47,64 @@ pub enum Kind {
     Period,
 }
 
+/// Where a shape is, in the covariate's scaled unit.
+#[derive(Debug, Clone, Copy)]
+pub(super) enum Form {
+    /// From here on.
+    From(f64),
+    /// About here, with this deviation.
+    About(f64, f64),
+    /// Turns per unit from a start, with a phase in turns.
+    Turns(f64, f64, f64),
+}
+
+impl Form {
+    /// Its value at a place.
+    pub(super) fn at(self, x: f64) -> f64 {
+        match self {
+            Form::From(start) => f64::from(u8::from(x >= start)),
+            Form::About(middle, width) => (-0.5 * ((x - middle) / width).powi(2)).exp(),
+            Form::Turns(per_unit, start, phase) => (2.0 * PI * (per_unit * (x - start) + phase)).sin(),
+        }
+    }
+}
+
+/// What a shape is in proportion to.
+#[derive(Debug, Clone, Copy)]
+pub(super) enum Way {
+    /// What a change of this input does, times this.
+    Input(Input, f64),
+    /// The root of friction and full friction.
+    Friction,
+    /// The same in every reading, N.
+    Reading(f64),
+}
+
+impl Way {
+    /// Its size at a problem's passes where the baseline predicts this, N.
+    pub(super) fn signal(self, part: &Problem, u: &[f64], prediction: &DVector<f64>) -> DVector<f64> {
+        match self {
+            Way::Input(input, scale) => part.sensitivity(&[], u, prediction, input) * scale,
+            Way::Friction => DVector::from_fn(part.len(), |i, _| {
+                let full = part.nominal.mu0 * part.passes[i].normal_force_n;
+                part.passes[i].direction.sign() * (prediction[i].abs() * full).sqrt()
+            }),
+            Way::Reading(size) => DVector::from_element(part.len(), size),
+        }
+    }
+}
+
+/// Where the best of a shape's places is, and under which scatter.
+#[derive(Debug, Clone, Copy)]
+pub(super) struct Placement {
+    pub(super) form: Form,
+    pub(super) way: Way,
+    /// Deviation of its size, in units of the way.
+    pub(super) sd: f64,
+    /// Scale of independent scatter, and how many columns of what lasts it stands for; none as settled.
+    pub(super) alone: Option<(f64, usize)>,
+}
+
 /// A departure of one kind over one covariate.
 #[derive(Debug, Clone)]
 pub struct Shape {
@@ -62,14 +120,16 @@ pub struct Shape {
     pub at: (f64, [f64; 2]),
     /// Size in units of full friction, with its interval.
     pub size: (f64, [f64; 2]),
+    pub(super) best: Placement,
 }
 
 /// Shapes of one kind over one covariate: where each is, and a column for each.
 struct Family {
     kind: Kind,
     covariate: &'static Covariate,
-    turns: bool,
+    way: Way,
     at: Vec<f64>,
+    forms: Vec<Form>,
     columns: DMatrix<f64>,
     /// Root mean square over passes of the column's unit, in full friction.
     unit: f64,
@@ -80,6 +140,7 @@ struct Family {
 struct Ground {
     covariance: Covariance,
     nats: f64,
+    alone: Option<(f64, usize)>,
 }
 
 /// Every kind of shape over every covariate that may have it, strongest first.
@@ -116,53 +177,66 @@ fn grounds(
     let evidence = |c: &Covariance| -0.5 * (c.quadratic(residual) + c.log_det());
     let settled = part.covariance(jacobian);
     let own = evidence(&settled);
-    let mut list = vec![Ground { covariance: settled, nats: 0.0 }];
+    let mut list = vec![Ground { covariance: settled, nats: 0.0, alone: None }];
     if lasting > 0 {
-        let shifts = part.common.columns(lasting, part.common.ncols() - lasting).into_owned();
-        let independent = Problem { common: shifts, ..part.clone() };
-        let columns = independent.beside_common(jacobian);
-        list.extend(SCALES.iter().map(|scale| {
-            let variance: Vec<f64> = part.variance.iter().map(|v| v * scale * scale).collect();
-            let covariance = Covariance::new(&variance, &columns);
+        list.extend(SCALES.map(|scale| {
+            let covariance = independent(part, scale, lasting).covariance(jacobian);
             let nats = evidence(&covariance) - own + cost - (SCALES.len() as f64).ln();
-            Ground { covariance, nats }
+            Ground { covariance, nats, alone: Some((scale, lasting)) }
         }));
     }
     list
 }
 
+/// A problem whose scatter is this much larger and does not last.
+pub(super) fn independent(part: &Problem, scale: f64, lasting: usize) -> Problem {
+    let shifts = part.common.columns(lasting, part.common.ncols() - lasting).into_owned();
+    let variance = part.variance.iter().map(|v| v * scale * scale).collect();
+    Problem { common: shifts, variance, ..part.clone() }
+}
+
 /// Log Bayes factor of one column, by its score b and information q, averaged over sizes; with the mean and
-/// deviation of its weight.
-fn factor(b: f64, q: f64) -> (f64, f64, f64) {
+/// deviation of its weight, at the best size.
+fn factor(b: f64, q: f64) -> Factor {
     let each = SIZES.map(|s| {
         let grown = 1.0 + s * s * q;
-        (0.5 * (b * b * s * s / grown - grown.ln()), b * s * s / grown, s / grown.sqrt())
+        let nats = 0.5 * (b * b * s * s / grown - grown.ln());
+        Factor { nats, mean: b * s * s / grown, sd: s / grown.sqrt(), size: s }
     });
-    let best = each.iter().fold(each[0], |a, e| if e.0 > a.0 { *e } else { a });
-    (log_sum_exp(&each.map(|e| e.0)) - (SIZES.len() as f64).ln(), best.1, best.2)
+    let best = each.iter().fold(each[0], |a, e| if e.nats > a.nats { *e } else { a });
+    Factor { nats: log_sum_exp(&each.map(|e| e.nats)) - (SIZES.len() as f64).ln(), ..best }
+}
+
+#[derive(Clone, Copy)]
+struct Factor {
+    nats: f64,
+    mean: f64,
+    sd: f64,
+    size: f64,
 }
 
 fn weighed(family: &Family, grounds: &[Ground], residual: &DVector<f64>) -> Shape {
     let count = family.at.len() as f64;
-    let mut parts: Vec<(f64, Vec<(f64, f64, f64)>)> = Vec::new();
+    let mut parts: Vec<(f64, Vec<Factor>)> = Vec::new();
     for ground in grounds {
         let (b, q) = ground.covariance.scores(&family.columns, residual);
-        let each: Vec<(f64, f64, f64)> = b.iter().zip(&q).map(|(b, q)| factor(*b, *q)).collect();
-        let all: Vec<f64> = each.iter().map(|e| e.0).collect();
+        let each: Vec<Factor> = b.iter().zip(&q).map(|(b, q)| factor(*b, *q)).collect();
+        let all: Vec<f64> = each.iter().map(|e| e.nats).collect();
         parts.push((ground.nats + log_sum_exp(&all) - count.ln(), each));
     }
     // Half the weight for scatter as settled, half for independent scatter.
     let share = if grounds.len() > 1 { 0.5_f64.ln() } else { 0.0 };
     let total: Vec<f64> = parts.iter().map(|p| p.0 + share).collect();
-    let best = parts.iter().max_by(|a, b| a.0.total_cmp(&b.0)).map(|p| p.1.as_slice()).unwrap_or_default();
-    let top = (0..best.len()).max_by(|&i, &j| best[i].0.total_cmp(&best[j].0)).unwrap_or(0);
-    let whole = log_sum_exp(&best.iter().map(|e| e.0).collect::<Vec<_>>());
+    let under = (0..parts.len()).max_by(|&i, &j| parts[i].0.total_cmp(&parts[j].0)).unwrap_or(0);
+    let best = parts[under].1.as_slice();
+    let top = (0..best.len()).max_by(|&i, &j| best[i].nats.total_cmp(&best[j].nats)).unwrap_or(0);
+    let whole = log_sum_exp(&best.iter().map(|e| e.nats).collect::<Vec<_>>());
     let mut order: Vec<usize> = (0..best.len()).collect();
     order.sort_by(|&i, &j| family.at[i].total_cmp(&family.at[j]));
     let end = |share: f64| {
         let mut sum = 0.0;
         let found = order.iter().find(|&&i| {
-            sum += (best[i].0 - whole).exp();
+            sum += (best[i].nats - whole).exp();
             sum >= share
         });
         family.at[*found.or(order.last()).unwrap_or(&0)]
@@ -172,64 +246,58 @@ fn weighed(family: &Family, grounds: &[Ground], residual: &DVector<f64>) -> Shap
     let [low, high] = ENDS.map(end);
     let below = places.clone().rfind(|at| *at < low).unwrap_or(low);
     let above = places.clone().find(|at| *at > high).unwrap_or(high);
-    let (size, sd) = (best[top].1 * family.unit, best[top].2 * family.unit);
+    let (size, sd) = (best[top].mean * family.unit, best[top].sd * family.unit);
     Shape {
         kind: family.kind,
         covariate: family.covariate,
-        turns: family.turns,
+        turns: !matches!(family.way, Way::Reading(_)),
         nats: log_sum_exp(&total),
         at: (family.at[top], [0.5 * (low + below), 0.5 * (high + above)]),
         size: (size, [size - 1.96 * sd, size + 1.96 * sd]),
+        best: Placement {
+            form: family.forms[top],
+            way: family.way,
+            sd: best[top].size,
+            alone: grounds[under].alone,
+        },
     }
 }
 
 fn families(part: &Problem, u: &[f64], prediction: &DVector<f64>) -> Vec<Family> {
     let full = part.full_friction();
     let mean = full.iter().sum::<f64>() / full.len() as f64;
-    let friction: Vec<f64> = (0..part.len())
-        .map(|i| part.passes[i].direction.sign() * (prediction[i].abs() * full[i]).sqrt())
-        .collect();
-    let rms = |f: &dyn Fn(usize) -> f64| {
-        ((0..full.len()).map(|i| f(i).powi(2)).sum::<f64>() / full.len() as f64).sqrt()
+    let rms = |f: &DVector<f64>| {
+        ((0..full.len()).map(|i| (f[i] / full[i]).powi(2)).sum::<f64>() / full.len() as f64).sqrt()
+    };
+    let friction = Way::Friction.signal(part, u, prediction);
+    // What a change of the friction coefficient or of the amplitude does is not in proportion to the force.
+    let input = |input: Input| {
+        let slope = Way::Input(input, 1.0).signal(part, u, prediction);
+        // A size is that of friction: a larger amplitude lowers it.
+        Way::Input(input, rms(&friction) / rms(&slope).max(1e-9).copysign(slope.dot(&friction)))
     };
     let both = part.passes.iter().any(|p| p.direction != part.passes[0].direction);
-    // What a change of the friction coefficient or of the amplitude does is not in proportion to the force.
-    let slope = |input: Input| {
-        let slope = part.sensitivity(&[], u, prediction, input);
-        // A size is that of friction: a larger amplitude lowers it.
-        let along: f64 = slope.iter().zip(&friction).map(|(s, f)| s * f).sum();
-        let size = rms(&|i| slope[i] / full[i]).max(1e-9).copysign(along);
-        let level = rms(&|i| friction[i] / full[i]);
-        (0..part.len()).map(|i| slope[i] * level / size).collect::<Vec<f64>>()
-    };
-    let inputs = [slope(Input::Friction), slope(Input::Amplitude), friction];
-    let mut signals: Vec<(bool, Vec<f64>, f64)> = inputs
-        .into_iter()
-        .map(|signal| {
-            let unit = rms(&|i| signal[i] / full[i]);
-            (true, signal, unit)
-        })
-        .collect();
-    if both {
-        signals.push((false, vec![mean; full.len()], rms(&|i| mean / full[i])));
-    }
+    let ways = [input(Input::Friction), input(Input::Amplitude), Way::Friction, Way::Reading(mean)];
+    let signals: Vec<(Way, DVector<f64>)> =
+        ways[..if both { 4 } else { 3 }].iter().map(|way| (*way, way.signal(part, u, prediction))).collect();
     let mut list = Vec::new();
     for covariate in COVARIATES {
         let values: Option<Vec<f64>> = part.passes.iter().map(|p| covariate.of(p)).collect();
         let Some(values) = values else { continue };
         for (kind, shapes) in over(part, covariate, &values) {
-            for (turns, signal, unit) in &signals {
-                let columns = DMatrix::from_fn(part.len(), shapes.len(), |i, j| shapes[j].1[i] * signal[i]);
+            for (way, signal) in &signals {
+                let columns = DMatrix::from_fn(part.len(), shapes.len(), |i, j| shapes[j].2[i] * signal[i]);
                 let at = shapes.iter().map(|s| s.0).collect();
-                list.push(Family { kind, covariate, turns: *turns, at, columns, unit: *unit });
+                let forms = shapes.iter().map(|s| s.1).collect();
+                list.push(Family { kind, covariate, way: *way, at, forms, columns, unit: rms(signal) });
             }
         }
     }
     list
 }
 
-/// A shape at some place or of some period, and its value at each pass.
-type Placed = (f64, Vec<f64>);
+/// A place, or the length of a period, with the shape there and its value at each pass.
+type Placed = (f64, Form, Vec<f64>);
 
 /// The shapes that a covariate may have: none where it has few levels, for there a jump is a law.
 fn over(part: &Problem, covariate: &Covariate, values: &[f64]) -> Vec<(Kind, Vec<Placed>)> {
@@ -244,33 +312,32 @@ fn over(part: &Problem, covariate: &Covariate, values: &[f64]) -> Vec<(Kind, Vec
     if range.is_nan() || range <= covariate.least_spread || apart + 1 < LEVELS {
         return Vec::new();
     }
-    let passes = |s: &[f64]| s.iter().map(|v| v.abs()).sum::<f64>();
+    let placed = |at: f64, form: Form| -> Placed { (at, form, x.iter().map(|v| form.at(*v)).collect()) };
+    let enough = |(_, _, s): &Placed| {
+        (FEWEST..=x.len() as f64 - FEWEST).contains(&s.iter().map(|v| v.abs()).sum::<f64>())
+    };
     let place = |q: f64| order[((order.len() - 1) as f64 * q).round() as usize];
     let mut jumps: Vec<Placed> = (1..PLACES[0])
         .map(|j| place(j as f64 / PLACES[0] as f64))
-        .map(|row| (values[row], x.iter().map(|v| f64::from(u8::from(*v >= x[row]))).collect::<Vec<f64>>()))
-        .filter(|(_, s)| (FEWEST..=x.len() as f64 - FEWEST).contains(&passes(s)))
+        .map(|row| placed(values[row], Form::From(x[row])))
+        .filter(enough)
         .collect();
     jumps.dedup_by(|a, b| a.0 == b.0);
     let mut bumps: Vec<Placed> = WIDTHS
         .iter()
         .flat_map(|width| (0..=PLACES[1]).map(move |j| (width, j as f64 / PLACES[1] as f64)))
         .map(|(width, q)| (width, place(q)))
-        .map(|(width, row)| {
-            let bell = |v: &f64| (-0.5 * ((v - x[row]) / (width * range)).powi(2)).exp();
-            (values[row], x.iter().map(bell).collect::<Vec<f64>>())
-        })
-        .filter(|(_, s)| (FEWEST..=x.len() as f64 - FEWEST).contains(&passes(s)))
+        .map(|(width, row)| placed(values[row], Form::About(x[row], width * range)))
+        .filter(enough)
         .collect();
-    bumps.dedup_by(|a, b| a == b);
+    bumps.dedup_by(|a, b| a.2 == b.2);
     let mut periods: Vec<Placed> = Vec::new();
     if matches!(covariate.role, Role::Time | Role::Place) {
         let most = PERIODS.1.min(x.len() as f64 / 4.0);
         let mut count = PERIODS.0;
         while count <= most {
             for phase in PHASES {
-                let wave = |v: &f64| (2.0 * PI * (count * (v - low) / range + phase)).sin();
-                periods.push((unit * range / count, x.iter().map(wave).collect()));
+                periods.push(placed(unit * range / count, Form::Turns(count / range, low, phase)));
             }
             count += PERIODS.2;
         }

@@ -1,5 +1,5 @@
-//! The law of a hypothesis: what it adds to the recalibrated baseline along the setting that moves it most,
-//! over the passes.
+//! What a hypothesis adds to the recalibrated baseline along the setting that moves it most, over the passes:
+//! as the table has it, and by the library's law alone.
 
 use super::overlay::Overlay;
 use crate::report::html::escape;
@@ -58,7 +58,7 @@ impl Overlay<'_> {
         };
         let swing = |k: usize| {
             let all: Vec<f64> =
-                (0..PLACES as usize).map(|i| adds(k * PLACES as usize + i, |f| f.form)).collect();
+                (0..PLACES as usize).map(|i| adds(k * PLACES as usize + i, |f| f.corrected)).collect();
             let (low, high) = ends(&all);
             high - low
         };
@@ -77,13 +77,13 @@ impl Overlay<'_> {
                 let i = k * PLACES as usize + i;
                 let sd =
                     (forecasts[i].corrected_sd.powi(2) - forecasts[i].scatter_sd.powi(2)).max(0.0).sqrt();
-                (x(*v), adds(i, |f| f.form), sd / self.full(&wanted[i]).abs())
+                (x(*v), adds(i, |f| f.corrected), sd / self.full(&wanted[i]).abs())
             })
             .collect();
         let marks: Vec<LawPass> = (0..passes.len())
             .filter_map(|i| {
                 let at = x(along.of(&passes[i])?);
-                let off = (self.table.lateral[i] - forecasts[curves + i].form) / self.full(&passes[i]);
+                let off = (self.table.lateral[i] - forecasts[curves + i].corrected) / self.full(&passes[i]);
                 Some(LawPass { x: at, y: on(&curve, at) + off, suspect: self.suspects.contains(&i) })
             })
             .collect();
@@ -93,13 +93,20 @@ impl Overlay<'_> {
             .filter_map(|c| Some(format!("{} {}", number(c.shown.0 * c.of(&base)?), c.shown.1)))
             .collect();
         let name = plain(&h.effects.join(" + "));
+        let alone: Vec<(f64, f64)> = places
+            .iter()
+            .enumerate()
+            .map(|(i, v)| (x(*v), adds(k * PLACES as usize + i, |f| f.form)))
+            .collect();
         let span = Span::over(curve.iter().map(|(x, ..)| *x), along.scale == Scale::Log);
-        let figure = law(&name, (&format!("{}, {}", along.words, along.shown.1), span), &marks, &curve)?;
+        let figure =
+            law(&name, (&format!("{}, {}", along.words, along.shown.1), span), &marks, &curve, &alone)?;
         Ok(figure
             + &crate::report::html::note(&format!(
-                "What {} adds to the recalibrated baseline along the {}, at {}. Line: its law; band: twice the standard deviation of its \
-                 parameters and of its departure from the law. Discs: passes, each at the law plus what it deviates from it, so that \
-                 passes at other conditions are on the same figure.",
+                "What {} adds to the recalibrated baseline along the {}, at {}. Line: as the table has it, with its departure from the \
+                 law; band: twice the standard deviation of its parameters and of that departure. Short dashes: the library's law \
+                 alone. Discs: passes, each at the line plus what it deviates from the model, so that passes at other conditions are \
+                 on the same figure.",
                 escape(&name),
                 along.words,
                 held.join(", ")

@@ -76,21 +76,24 @@ fn rings(
 pub struct LawPass {
     /// Abscissa.
     pub x: f64,
-    /// The law there plus what the pass deviates from it.
+    /// The model there plus what the pass deviates from it.
     pub y: f64,
     /// Whether the pass is a suspect.
     pub suspect: bool,
 }
 
-/// A law over the passes: its curve with a band of two standard deviations.
+/// What a cause does, over the passes: the curve with a band of two standard deviations, and the library's law
+/// alone.
 pub fn law(
     name: &str,
     (x_name, span): (&str, Span),
     passes: &[LawPass],
     curve: &Curve,
+    alone: &[(f64, f64)],
 ) -> miette::Result<String> {
     let alt = format!("The law of {name} against {x_name}, with its band, over {} passes.", passes.len());
-    let all = || passes.iter().map(|p| p.y).chain(curve.iter().map(|(_, y, _)| *y)).chain([0.0]);
+    let all = || passes.iter().map(|p| p.y).chain(curve.iter().map(|(_, y, _)| *y));
+    let all = || all().chain(alone.iter().map(|(_, y)| *y)).chain([0.0]);
     let [low, high] = all().fold([0.0f64; 2], |[l, h], v| [l.min(v), h.max(v)]);
     let margin = 0.06 * (high - low);
     let axis = [(low - margin).max(-1.5), (high + margin).min(1.5)];
@@ -110,11 +113,14 @@ pub fn law(
         chart
             .draw_series(passes.iter().map(|p| mark(0, (p.x, cut(p.y)), size - 1, BLACK, true)))
             .map_err(wrong)?;
+        line(chart, alone.iter().map(|(x, y)| (*x, cut(*y))).collect(), COLOURS[1], Some(3))?;
         line(chart, edge(0.0), COLOURS[0], None)?;
         rings(chart, passes.iter().filter(|p| p.suspect).map(|p| (p.x, cut(p.y))), size)
     })?;
     let beyond = beyond(all(), axis);
-    Ok(format!("<figure>{svg}<figcaption>Dashed: no change of the baseline.{beyond}</figcaption></figure>"))
+    Ok(format!(
+        "<figure>{svg}<figcaption>Grey, dashed: no change of the baseline.{beyond}</figcaption></figure>"
+    ))
 }
 
 /// Measured against predicted `mu'` of every pass: left the recalibrated baseline, right the verdict's model.
