@@ -102,13 +102,14 @@ fn silent_regions(fitted: &Fitted, decision: &Decision) -> Option<String> {
     let silent: Vec<&str> = list.map(|r| r.name.as_str()).collect();
     let bent = decision.leader().is_some_and(|l| !fitted.candidates[l].best.change.bent.is_empty());
     let why = if bent {
-        "the size of the leading cause may be any smooth function there, or the rest of the table tells nothing of it"
+        "Its size there may be any smooth function, or the rest of the table tells nothing of it."
     } else {
-        "the rest of the table tells nothing of the leading cause"
+        "The rest of the table tells nothing of it."
     };
     let regions = silent.join(", ");
-    (!silent.is_empty())
-        .then(|| format!("Without {regions} {why}, so these regions do not judge it. A further level would."))
+    (!silent.is_empty()).then(|| {
+        format!("Left-out regions that do not judge the leading cause: {regions}. {why} A further level would.")
+    })
 }
 
 /// Nats by which a bent cause must explain the table better than its law for the law to be called another.

@@ -134,9 +134,14 @@ impl Ranged for Axis {
 
 impl ValueFormatter<f64> for Axis {
     fn format_ext(&self, value: &f64) -> String {
-        match self {
+        let text = match self {
             Axis::Linear(axis) => axis.format_ext(value),
             Axis::Logarithmic(axis) => axis.format_ext(value),
+        };
+        // A zero that rounding made negative has no sign.
+        match text.strip_prefix('-').filter(|rest| rest.bytes().all(|b| matches!(b, b'0' | b'.'))) {
+            Some(zero) => zero.to_string(),
+            None => text,
         }
     }
 }
@@ -359,6 +364,12 @@ pub fn mark_name(series: usize) -> &'static str {
 #[cfg(test)]
 mod tests {
     use super::*;
+
+    #[test]
+    fn a_zero_on_an_axis_has_no_sign() {
+        let axis = Span::linear(-0.1..0.1).axis();
+        assert_eq!([-1e-18, -0.05].map(|v| axis.format_ext(&v)), ["0.0", "-0.05"]);
+    }
 
     #[test]
     fn a_mark_is_where_it_was_measured_or_the_caption_says_that_it_is_not() {
