@@ -186,8 +186,6 @@ constants! {
     region_closed: f64 = 0.5, "Share of its gap from which a region counts as closed.", CONTRACT;
     closure: [f64; 3] = [0.42, 0.54, 0.58], "Pooled closure at which a cause and a mimic are as likely, by the form share needed.", MIMICS;
     closure_scale: f64 = 0.06, "Scale on which that odds ratio changes by a factor of e.", "development: on two generators true causes of another form close 0.4 to 0.65, and so do mimics";
-    lead_nats: f64 = 50.0, "Nats by which a single cause must explain the table better than any departure without a cause for that odds ratio to change by a factor of e.", "development: 82 singles and 70 causes outside the library, of the third generator and of the simulation";
-    lead_most: f64 = 2.0, "Largest logarithm of that factor.", "development: 82 singles and 70 causes outside the library, of the third generator and of the simulation";
     half_open_survival: f64 = 0.1, "Largest share of the probability that survives where fewer than half of the regions are closed.", "contract asks for half of the regions; the value is judgement";
     few_regions: usize = 3, "Number of carrying regions below which their count says nothing.", JUDGEMENT;
 

@@ -73,7 +73,7 @@ pub fn decide(fitted: &mut Fitted) -> Decision {
     let (k, candidates) = (&*fitted.problem.constants, &fitted.candidates);
     if claimed {
         // An effect that cannot predict what it has not seen is no cause: its weight goes to the open set.
-        let survival = judged.survival(k, candidates[leader].best.freedom.share, lead(fitted, leader));
+        let survival = judged.survival(k, candidates[leader].best.freedom.share);
         for p in &mut probabilities {
             unknown += *p * (1.0 - survival);
             *p *= survival;
@@ -113,17 +113,6 @@ fn doubted(fitted: &Fitted, none: f64, unknown: f64, probabilities: &mut [f64]) 
     (mixed(none, no_gap), mixed(unknown, open))
 }
 
-/// Nats by which a single cause explains the table better than a smooth departure and than any one shape;
-/// nothing of a pair, for two causes together imitate what the library lacks.
-fn lead(fitted: &Fitted, leader: usize) -> f64 {
-    let own = &fitted.candidates[leader];
-    let shape = fitted.shapes.first().map_or(f64::NEG_INFINITY, |s| s.nats) + fitted.evidence[0];
-    match own.effects.len() {
-        1 => own.log_evidence - shape.max(fitted.discrepancy.log_evidence),
-        _ => 0.0,
-    }
-}
-
 /// The leader on the left-out regions. Of its laws that the evidence does not tell apart the one that
 /// predicts best what it has not seen stands for the cause: which of them is a tenth of a nat ahead is no
 /// ground to doubt the cause. Where no gap is claimed there is nothing to choose for.
@@ -139,7 +128,7 @@ fn judged(fitted: &mut Fitted, leader: usize, claimed: bool) -> (Vec<Region>, Ga
     let judge = |law: Posterior| {
         let regions = left_out_regions(fitted, &law);
         let gate = gate(&k, &regions);
-        (gate.survival(&k, law.freedom.share, 0.0), law, regions, gate)
+        (gate.survival(&k, law.freedom.share), law, regions, gate)
     };
     let all = laws.into_iter().map(judge);
     let (_, law, regions, gate) =

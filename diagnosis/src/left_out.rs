@@ -271,13 +271,11 @@ pub struct Gate {
 
 impl Gate {
     /// Share of a candidate's probability that survives: one half where it closes just so much as a mimic
-    /// may, and ever less below that. `share` is the form uncertainty that it needed, `lead` the nats by which
-    /// it explains the table better than any departure without a cause.
-    pub fn survival(&self, k: &Constants, share: f64, lead: f64) -> f64 {
+    /// may, and ever less below that. `share` is the form uncertainty that it needed.
+    pub fn survival(&self, k: &Constants, share: f64) -> f64 {
         let rank = k.form_shares.iter().filter(|s| **s < share * (1.0 - 1e-9)).count();
         let middle = k.closure[rank.min(k.closure.len() - 1)];
-        let led = (lead / k.lead_nats).clamp(0.0, k.lead_most);
-        let pooled = 1.0 / (1.0 + (-(self.pooled - middle) / k.closure_scale - led).exp());
+        let pooled = 1.0 / (1.0 + (-(self.pooled - middle) / k.closure_scale).exp());
         let half_open = 2 * self.closed < self.carrying && self.carrying >= k.few_regions;
         if half_open { pooled.min(k.half_open_survival) } else { pooled }
     }
@@ -324,17 +322,10 @@ mod tests {
     #[test]
     fn the_gate_is_open_where_causes_and_mimics_close_as_much() {
         let k = Constants::default();
-        let survives =
-            |pooled: f64| Gate { pooled, carrying: 6, closed: 5 }.survival(&k, k.form_shares[1], 0.0);
+        let survives = |pooled: f64| Gate { pooled, carrying: 6, closed: 5 }.survival(&k, k.form_shares[1]);
         assert!((0.05..0.95).contains(&survives(0.45)) && (0.05..0.95).contains(&survives(0.65)));
         assert!(survives(0.1) < 0.01 && survives(0.95) > 0.99);
-        assert!(Gate { pooled: 0.95, carrying: 6, closed: 2 }.survival(&k, k.form_shares[1], 1e3) <= 0.1);
-        // What no departure without a cause explains as well is more probably the cause, within bounds.
-        let led = |lead: f64| {
-            let gate = Gate { pooled: 0.55, carrying: 6, closed: 5 };
-            gate.survival(&k, k.form_shares[1], lead)
-        };
-        assert!(led(-50.0) == led(0.0) && led(0.0) < led(50.0) && led(50.0) < led(1e3) && led(1e3) < 0.95);
+        assert!(Gate { pooled: 0.95, carrying: 6, closed: 2 }.survival(&k, k.form_shares[1]) <= 0.1);
     }
 
     /// One vibrating pass, predicted from passes with the plate still, which tell nothing of the stiffnesses:
