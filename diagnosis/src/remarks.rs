@@ -108,7 +108,9 @@ fn silent_regions(fitted: &Fitted, decision: &Decision) -> Option<String> {
     };
     let regions = silent.join(", ");
     (!silent.is_empty()).then(|| {
-        format!("Left-out regions that do not judge the leading cause: {regions}. {why} A further level would.")
+        format!(
+            "Left-out regions that do not judge the leading cause: {regions}. {why} A further level would."
+        )
     })
 }
 

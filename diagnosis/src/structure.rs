@@ -6,6 +6,7 @@
 //! finds what repeats. The strongest of all is held against the same of passes that are shuffled and turned either way, so the level is
 //! that of the whole family; its tail is that of the largest of many (Gumbel).
 
+mod form;
 pub mod laid;
 pub mod shapes;
 
