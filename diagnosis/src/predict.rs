@@ -148,8 +148,15 @@ pub fn model(fitted: &Fitted, table: &Table, answer: &Answer, rows: Option<&[usi
         }
         Which::Shape(i) => Part::Shape(Box::new(Laid::fit(&fitted.shapes[i], &problem, &baseline))),
     };
-    let parts = answer.parts.iter().map(|(weight, which)| (*weight, part(*which))).collect();
-    let law = answer.leader.map(|leader| refit(fitted.candidates[leader].best.by_law()));
+    let parts: Vec<_> = answer.parts.iter().map(|(weight, which)| (*weight, part(*which))).collect();
+    let law = answer.leader.map(|leader| {
+        let own = &fitted.candidates[leader].best;
+        let at = answer.parts.iter().position(|(_, which)| *which == Which::Cause(leader));
+        match at.filter(|_| own.plain.is_none()).map(|at| &parts[at].1) {
+            Some(Part::Effects { best, .. }) => (**best).clone(),
+            _ => refit(own.by_law()),
+        }
+    });
     Model { parts, law, problem, baseline }
 }
 

@@ -117,7 +117,7 @@ fn silent_regions(fitted: &Fitted, decision: &Decision) -> Option<String> {
 /// Nats by which a bent cause must explain the table better than its law for the law to be called another.
 const BENT_NATS: f64 = 5.0;
 
-/// Says of a named cause whose law is not the rig's that it is not.
+/// Says of a named cause that the table speaks against its law.
 fn bent(fitted: &Fitted, decision: &Decision) -> Option<String> {
     let led = matches!(decision.verdict, Verdict::Named | Verdict::Ambiguous);
     let leader = &fitted.candidates[decision.leader().filter(|_| led)?];
@@ -130,10 +130,10 @@ fn bent(fitted: &Fitted, decision: &Decision) -> Option<String> {
     let of: Vec<String> = of.collect();
     (nats > BENT_NATS).then(|| {
         format!(
-            "The law of the library is not that of the rig: another form of {} explains the table better, by {nats:.0} \
-             nats. Predictions follow that form. Parameters, their intervals and the saved model are those of the \
-             library's law.",
-            of.join(" and of ")
+            "The table speaks against the library's law: {} of a free form explains it better, by {nats:.0} nats. \
+             Predictions follow that form. Parameters, their intervals and the saved model are those of the library's \
+             law.",
+            of.join(" and ")
         )
     })
 }
