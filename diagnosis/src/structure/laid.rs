@@ -72,8 +72,8 @@ mod tests {
         for (p, lateral) in whole.passes.iter().zip(&mut whole.lateral) {
             *lateral += if p.time_s >= 90.0 { 0.06 } else { 0.0 };
         }
-        let (kept, held): (Vec<usize>, Vec<usize>) = (0..whole.len()).partition(|i| i % 3 != 1);
-        let result = diagnose(&whole.select(&kept), &rig(), &Options::default(), String::new());
+        let (fitted, held): (Vec<usize>, Vec<usize>) = (0..whole.len()).partition(|i| i % 3 != 1);
+        let result = diagnose(&whole.select(&fitted), &rig(), &Options::default(), String::new());
         assert_eq!(result.report.verdict, Verdict::Unknown, "{}", result.report.text);
         assert_eq!(result.report.description[0].covariate, "time_s");
         let held = whole.select(&held);
