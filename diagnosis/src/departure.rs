@@ -316,5 +316,13 @@ mod tests {
         assert!(!alone.change.bends_over(&TIME));
         let (_, best) = averaged_over_form(&problem, &fit, &members, &basis);
         assert!(best.freedom.bend > 0.0 && best.by_law().freedom.bend == 0.0);
+        // The verdict says that the law is not this.
+        let report = crate::verdict::diagnose(&table, &rig(), &Default::default(), String::new()).report;
+        assert!(report.hypotheses[0].effects == ["resonance_detuning"], "{}", report.text);
+        let says = report
+            .remarks
+            .iter()
+            .any(|r| r.contains("resonance detuning as a function of time of a free form"));
+        assert!(says, "{:?}", report.remarks);
     }
 }

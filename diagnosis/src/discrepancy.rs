@@ -59,7 +59,7 @@ pub struct Discrepancy {
 }
 
 /// Size on which a departure is measured at a pass: between the friction there and full friction, N.
-fn scale(baseline: f64, full: f64) -> f64 {
+pub(crate) fn scale(baseline: f64, full: f64) -> f64 {
     (baseline.abs() * full).sqrt()
 }
 

@@ -76,6 +76,20 @@ impl Answer {
     }
 }
 
+/// What an answer predicts by, in words.
+impl std::fmt::Display for Answer {
+    fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
+        f.write_str(match self.parts.as_slice() {
+            [(_, Which::Baseline)] => "the recalibrated baseline",
+            [(_, Which::Cause(i))] if self.leader == Some(*i) => "the leading cause",
+            [(_, Which::Cause(_))] => "the hypothesis with the most evidence",
+            [(_, Which::Open)] => "a smooth map",
+            [(_, Which::Shape(_))] => "the first shape described",
+            _ => "the mean of the hypotheses with the most evidence",
+        })
+    }
+}
+
 fn averaged(fitted: &Fitted) -> Vec<(f64, Which)> {
     let none = fitted.none.log_evidence;
     let causes = fitted.candidates.iter().enumerate();

@@ -218,7 +218,7 @@ pub fn diagnose(table: &Table, rig: &RigFile, options: &Options, sha256: String)
     let report = Report {
         schema: "muprime.verdict/1",
         verdict: decision.verdict,
-        text: sentence(&fitted, &decision, &gap),
+        text: sentence(&fitted, &decision, &gap, &answer),
         hypotheses,
         location,
         left_out: LeftOut {
@@ -268,7 +268,7 @@ pub fn probability(p: f64) -> String {
     }
 }
 
-fn sentence(fitted: &Fitted, decision: &Decision, gap: &Gap) -> String {
+fn sentence(fitted: &Fitted, decision: &Decision, gap: &Gap, answer: &Answer) -> String {
     let closed = |with: &str| {
         let Some(share) = gap.shrinkage else {
             return match gap.before_rmse {
@@ -299,7 +299,7 @@ fn sentence(fitted: &Fitted, decision: &Decision, gap: &Gap) -> String {
             closed("it")
         ),
         Verdict::Ambiguous if decision.class.len() == 1 => {
-            let (name, closed) = (words(leader), closed("it"));
+            let (name, closed) = (words(leader), closed(&answer.to_string()));
             if let Some(cause) = imitated(&fitted.candidates[leader].names()) {
                 format!(
                     "{name} together, or {}, which is not in the library: this table cannot separate them; {closed}.",
@@ -314,7 +314,7 @@ fn sentence(fitted: &Fitted, decision: &Decision, gap: &Gap) -> String {
         }
         Verdict::Ambiguous => {
             let names: Vec<String> = decision.class.iter().take(6).map(|&i| words(i)).collect();
-            format!("This table cannot separate {}; {}.", names.join(", "), closed("the first"))
+            format!("This table cannot separate {}; {}.", names.join(", "), closed(&answer.to_string()))
         }
         Verdict::Unknown => {
             let known = fitted.unlisted.first().filter(|s| {
@@ -332,7 +332,7 @@ fn sentence(fitted: &Fitted, decision: &Decision, gap: &Gap) -> String {
             };
             format!(
                 "There is a gap, and no effect of the library explains most of it; {}.{hint}",
-                closed("a smooth map")
+                closed(&answer.to_string())
             )
         }
     }

@@ -1,5 +1,6 @@
 //! What a shape is made of: its form over a covariate, and what it is in proportion to.
 
+use crate::discrepancy::scale;
 use crate::fit::Problem;
 use effects::Input;
 use nalgebra::DVector;
@@ -45,7 +46,7 @@ impl Way {
             Way::Input(input, scale) => part.sensitivity(&[], u, prediction, input) * scale,
             Way::Friction => DVector::from_fn(part.len(), |i, _| {
                 let full = part.nominal.mu0 * part.passes[i].normal_force_n;
-                part.passes[i].direction.sign() * (prediction[i].abs() * full).sqrt()
+                part.passes[i].direction.sign() * scale(prediction[i], full)
             }),
             Way::Reading(size) => DVector::from_element(part.len(), size),
         }

@@ -76,6 +76,7 @@ mod tests {
         let result = diagnose(&whole.select(&fitted), &rig(), &Options::default(), String::new());
         assert_eq!(result.report.verdict, Verdict::Unknown, "{}", result.report.text);
         assert_eq!(result.report.description[0].covariate, "time_s");
+        assert!(result.report.text.contains("with the first shape described"), "{}", result.report.text);
         let held = whole.select(&held);
         let mut errors = [0.0; 2];
         for (i, f) in result.predict(&held).iter().enumerate() {

@@ -103,10 +103,10 @@ impl Overlay<'_> {
             law(&name, (&format!("{}, {}", along.words, along.shown.1), span), &marks, &curve, &alone)?;
         Ok(figure
             + &crate::report::html::note(&format!(
-                "What {} adds to the recalibrated baseline along the {}, at {}. Line: as the table has it, with its departure from the \
-                 law; band: twice the standard deviation of its parameters and of that departure. Short dashes: the library's law \
-                 alone. Discs: passes, each at the line plus what it deviates from the model, so that passes at other conditions are \
-                 on the same figure.",
+                "What {} adds to the recalibrated baseline along the {}, at {}. Line: as the table has it, with its \
+                 departure from the law; band: twice the standard deviation of its parameters and of that departure. \
+                 Short dashes: the library's law alone. Discs: passes, each at the line plus what it deviates from \
+                 the model, so that passes at other conditions are on the same figure.",
                 escape(&name),
                 along.words,
                 held.join(", ")
