@@ -33,13 +33,13 @@ elsewhere! {
     21 "wall-clock jump":
         "tests/wall/wire_faults.rs" a_jump_of_the_wall_clock_trips_nothing_and_stamps_nothing_wrong;
     23 "the process stopped, the port blocked":
-        "realtime/src/pacing/tests.rs" a_process_that_was_stopped_trips_first_thing,
-        "realtime/src/pacing/tests.rs" a_blocked_port_is_lateness_overruns_and_a_trip,
+        "realtime/src/pacing/thread/tests.rs" a_process_that_was_stopped_trips_first_thing,
+        "realtime/src/pacing/thread/tests.rs" a_blocked_port_is_lateness_overruns_and_a_trip,
         "tests/wall/wire_faults.rs" a_stopped_controller_is_outlived_by_the_amplifiers_watchdog_and_trips_when_it_goes_on;
     25 "panic of the loop":
-        "realtime/src/pacing/tests.rs" a_port_that_panics_ends_the_loop_with_the_drive_off;
+        "realtime/src/pacing/thread/tests.rs" a_port_that_panics_ends_the_loop_with_the_drive_off;
     26 "slow recorder, full ring":
-        "realtime/src/pacing/tests.rs" a_full_ring_is_counted_and_holds_nothing_up;
+        "realtime/src/pacing/thread/tests.rs" a_full_ring_is_counted_and_holds_nothing_up;
     27 "disk full, read-only":
         "tests/wall/disk.rs" a_disk_that_fails_stops_the_sweep_in_order_and_keeps_what_was_measured,
         "tests/peers/crash.rs" a_read_only_folder_is_refused_before_anything_moves;
@@ -47,7 +47,7 @@ elsewhere! {
         "tests/wall/kills.rs" killed_at_any_instant_nothing_acknowledged_is_lost_and_the_drive_drops;
     29 "signals":
         "tests/wall/session.rs" an_interrupt_stops_safely_and_keeps_what_was_measured,
-        "realtime/src/pacing/tests.rs" a_stop_is_off_within_two_cycles_however_full_the_queue;
+        "realtime/src/pacing/thread/tests.rs" a_stop_is_off_within_two_cycles_however_full_the_queue;
     30 "power cut":
         "tests/peers/power.rs" a_power_cut_at_any_instant_loses_nothing_that_was_acknowledged,
         "tests/record.rs" a_short_record_cut_at_every_byte_is_read_up_to_the_cut_and_recovered,

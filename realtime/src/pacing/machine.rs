@@ -3,49 +3,7 @@
 //! Nothing here is needed for safety: [`Grants`] lists what was refused, and a loop that is late for it
 //! trips.
 
-use serde::{Deserialize, Serialize};
-
-/// What the thread requested of the machine and what it got.
-#[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
-pub struct Grants {
-    /// Scheduling policy as read back: `fifo`, `other`, or a number.
-    pub policy: String,
-    /// Priority as read back.
-    pub priority: i32,
-    /// Why SCHED_FIFO was not granted.
-    pub policy_refused: Option<String>,
-    /// Whether all memory is locked.
-    pub memory_locked: bool,
-    /// Why memory could not be locked.
-    pub lock_refused: Option<String>,
-    /// CPUs that the thread may run on, as read back; empty where it was not pinned.
-    #[serde(default)]
-    pub pinned_to: Vec<usize>,
-    /// Why it could not be pinned, or the CPUs could not stay awake.
-    pub pace_refused: Option<String>,
-    /// Whether deep sleep of the CPUs is held off.
-    #[serde(default)]
-    pub cpus_kept_awake: bool,
-}
-
-/// What the loop's thread is to ask of the machine. All of it is optional; each has its price.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Serialize, Deserialize)]
-pub struct Pacing {
-    /// FIFO priority to ask for, with locked memory; `None` leaves scheduling and memory alone.
-    pub priority: Option<i32>,
-    /// CPU to run on and no other. Worth it on a CPU that is free of other work; on a shared one it is worse.
-    pub cpu: Option<usize>,
-    /// Keeps CPUs out of deep sleep (`/dev/cpu_dma_latency`): a shorter wake-up for some watts.
-    pub keep_cpus_awake: bool,
-    /// The last so many ns before a deadline are spun, not slept: of a CPU this costs that share of the period.
-    pub spin_ns: u64,
-}
-
-impl From<Option<i32>> for Pacing {
-    fn from(priority: Option<i32>) -> Self {
-        Pacing { priority, ..Pacing::default() }
-    }
-}
+use super::Grants;
 
 /// CLOCK_MONOTONIC in ns.
 pub fn monotonic_ns() -> u64 {

@@ -1,5 +1,6 @@
 //! The reported grants are compared with what the kernel reports of the thread.
 
+use super::super::Pacing;
 use super::*;
 use std::sync::{Mutex, MutexGuard};
 use std::time::Duration;

@@ -40,7 +40,7 @@ fn the_first_cycle_misses_no_deadline() {
 /// Page faults are those after the first cycle, which brings in what the loop needs.
 #[test]
 fn faults_are_counted_from_the_second_cycle_on() {
-    let _alone = super::super::machine::tests::alone();
+    let _alone = super::super::super::machine::tests::alone();
     let mut running = Running::with(50, 16384, Scene { touches: 4000, ..Scene::default() });
     running.until("some cycles", |row| row.cycle >= 3);
     running.scene.lock().unwrap().touches = 500;

@@ -321,7 +321,7 @@ fn suspended_child() {
 fn a_process_that_was_stopped_trips_first_thing() {
     use std::io::BufRead;
     let mut child = std::process::Command::new(std::env::current_exe().unwrap())
-        .args(["--exact", "pacing::tests::suspended_child", "--ignored", "--nocapture"])
+        .args(["--exact", "pacing::thread::tests::suspended_child", "--ignored", "--nocapture"])
         .stdout(std::process::Stdio::piped())
         .spawn()
         .unwrap();
