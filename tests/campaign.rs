@@ -60,12 +60,14 @@ fn answers_are_right_on_three_natures() {
         ),
         ("load-dependent friction", "[[defect]]\nname = \"load_dependent_friction\"\nseed = 3\n"),
     ];
+    // By default the two whose answers are known beforehand.
+    let natures = &natures[..tests::rounds(2, 3)];
     let rounds = tests::rounds(1, 50);
     let (mut wrong, mut said, mut owed, mut decided) = (0, 0, 0, 0);
     let campaigns = (0..natures.len() * rounds).into_par_iter();
     let answer = |i: usize| answers(&ideal(100 + (i % rounds) as u64, 2), natures[i / rounds].1);
     let mut answered: Vec<Vec<Claim>> = campaigns.map(answer).collect();
-    for (nature, _) in natures {
+    for &(nature, _) in natures {
         let mut found = BTreeMap::<&str, Vec<Claim>>::new();
         let all: Vec<Vec<Claim>> = answered.drain(..rounds).collect();
         for claim in all.into_iter().flatten() {

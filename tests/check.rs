@@ -3,7 +3,7 @@
 use models::pass::Pass;
 use serde_json::Value;
 use std::path::{Path, PathBuf};
-use tests::{documents, muprime, texts};
+use tests::{documents, muprime, rounds, texts};
 
 fn checked(words: &[&str], file: &Path) -> (Option<i32>, Value) {
     let output = muprime().args(["check", "--json"]).args(words).arg(file).output().unwrap();
@@ -517,13 +517,15 @@ fn nothing_that_check_approves_is_refused_by_run() {
         };
         text.lines().enumerate().map(line).collect()
     };
+    // By default every other value, from line to line in turn.
+    let taken = |at: usize| values.into_iter().skip(at % rounds(2, 1)).step_by(rounds(2, 1));
     for at in numbers(&plan) {
-        for value in values {
+        for value in taken(at) {
             trial(&with(&plan, at, value), &setup, &format!("plan line {at} = {value}"));
         }
     }
     for at in numbers(&setup) {
-        for value in values {
+        for value in taken(at) {
             trial(&plan, &with(&setup, at, value), &format!("setup line {at} = {value}"));
         }
     }

@@ -77,7 +77,7 @@ fn score(what: &str, n: u64, defect: impl Fn(f64) -> String + Sync, cause: &str)
 
 #[test]
 fn withheld_lags_and_shifts_are_found_with_their_size() {
-    let n = rounds(8, 30);
+    let n = rounds(5, 30);
     let stated = mean_delay_s(200.0);
     let lag = |late: f64| {
         let bandwidth = mean_delay_s(1.0) / (stated + late);
@@ -101,7 +101,7 @@ fn withheld_lags_and_shifts_are_found_with_their_size() {
 
 #[test]
 fn none_is_claimed_where_there_is_none_whatever_else_acts() {
-    let n = rounds(8, 30);
+    let n = rounds(5, 30);
     for (what, defects) in [
         ("nothing", ""),
         ("adhesion", "[[defect]]\nname = \"adhesion\"\nseed = SEED\n"),

@@ -40,7 +40,7 @@ fn every_fault_is_answered_within_its_bound_while_a_target_is_rendered() {
         for (row, fault) in
             ROWS.iter().enumerate().filter(|(_, fault)| fault.moments.contains(&Moment::Slide))
         {
-            for seed in 0..rounds(3, 100) {
+            for seed in 0..rounds(2, 100) {
                 let strikes = vec![Strike { row, at: STEADY_AT + 37 * seed % 401 }];
                 tally.take(&Scene { moment: Moment::Render, seed, strikes, pace }, seed == 0);
             }
@@ -58,7 +58,7 @@ fn every_fault_is_answered_within_its_bound_while_a_target_is_rendered() {
 fn without_a_fault_nothing_trips() {
     for pace in PACES {
         for moment in [Moment::Idle, Moment::Ramp, Moment::Hold, Moment::Slide, Moment::Render] {
-            for seed in 0..rounds(5, 40) {
+            for seed in 0..rounds(3, 40) {
                 let found = run(&Scene { moment, seed, strikes: Vec::new(), pace }, false);
                 assert!(found.wrong.is_empty() && found.trip.is_none(), "{moment:?} {seed}: {found:?}");
             }
@@ -73,7 +73,7 @@ fn many(settings: Settings, seeds: u64) -> Tally {
 /// Two thousand seeds in `tests/run long`.
 #[test]
 fn hundreds_of_seeds_and_none_over_a_bound() {
-    let seeds = rounds(250, 2000);
+    let seeds = rounds(150, 2000);
     for pace in PACES {
         assert_clean(&many(Settings { pace, ..Settings::default() }, seeds));
     }
@@ -81,7 +81,7 @@ fn hundreds_of_seeds_and_none_over_a_bound() {
 
 #[test]
 fn random_pairs_of_faults() {
-    let seeds = rounds(125, 1000);
+    let seeds = rounds(75, 1000);
     let tally = many(Settings { pairs: true, ..Settings::default() }, seeds);
     let struck = tally.reactions.values().map(|r| r.runs).sum::<u64>();
     assert!(10 * struck > 19 * seeds, "pairs have two faults: {struck}");

@@ -57,7 +57,7 @@ fn median(mut values: Vec<f64>) -> f64 {
 /// Every finger of the virtual rig has stiffnesses of its own, 5 % about the nominal ones; nobody tells the fit.
 #[test]
 fn the_interval_of_the_ratio_holds_the_truth() {
-    let sweeps = rounds(50, 400);
+    let sweeps = rounds(30, 400);
     let swept = swept(sweeps, &WorldConfig::ideal());
     for count in [10, 20, 40, 82] {
         let told = fitted(&swept, count);
