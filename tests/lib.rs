@@ -1,4 +1,4 @@
-//! Helpers that several system tests share.
+//! Helpers that several system tests share: `peer`, `served`, `study`, `waiting`. README.md lists the tests.
 
 pub mod peer;
 pub mod served;

@@ -1,10 +1,10 @@
-//! Where simulation and reality part, and why: a table of friction passes in, a verdict out.
+//! Where measurement and model disagree, and why: a table of friction passes in, a verdict out.
 //!
-//! | room | purpose |
+//! | module | purpose |
 //! |---|---|
 //! | [`data`] | the table: passes in the order of measurement, and what its design can show |
 //! | [`noise`], [`scatter`] | the variance of each pass, from rig.toml, replicates and the table itself: suspects, shifts of runs |
-//! | [`constants`] | every tunable constant with its meaning and source |
+//! | [`constants`], [`progress`], `draws` | tunable constants; progress; repeatable random numbers |
 //! | [`law`] | a base law in place of the spring-slider |
 //! | [`member`], [`fit`], [`layout`], [`least_squares`] | the regression problem of a hypothesis, its vector of parameters, its fit |
 //! | [`gaussian`], [`kernel`] | Gaussian algebra of low rank; smooth functions over the operating space |
@@ -18,13 +18,15 @@
 //! | [`intervals`], [`pulls`] | profile intervals; how far the stiffnesses went from their calibration |
 //! | [`locate`] | which part of the operating space, and of the rig, carries the gap |
 //! | [`shrinkage`], [`predict`] | how far the gap shrinks on held-out passes; the predictive distribution |
-//! | [`next`] | the experiment that would part the leading hypotheses |
+//! | [`novelty`], `run_shifts` | predictions in a run that the table lacks, or later; in a run that it has |
+//! | [`next`], [`power`] | the experiment that separates the leading hypotheses; detectable sizes |
 //! | [`reading`] | which reading of the paper's w the passes favour |
 //! | [`describe`] | what an unknown departure looks like; causes that are sure all the same |
 //! | [`timing`] | what the edges in a run's record say of lags and shifts in time |
-//! | [`verdict`], [`remarks`], [`saved`] | the report; remarks beside it; the corrected model for a run |
+//! | [`verdict`], [`document`], [`remarks`] | the report, its JSON, remarks beside it |
+//! | [`certificates`], [`saved`] | certificates in doubt; the corrected model for a run |
 //!
-//! docs/diagnosis/model.md states the whole model once. A small table in, a verdict out:
+//! docs/diagnosis/model.md states the whole model once, with the module of each section. An example:
 //!
 //! ```
 //! use models::pass::read_passes;

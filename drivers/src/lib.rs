@@ -1,4 +1,4 @@
-//! Drivers: the instruments of a rig behind the loop's ports.
+//! Drivers: the instruments of a rig behind the loop's ports. The bundled profiles are in `profiles/`.
 //!
 //! One thread a link does all the talking. It decodes frames by the instrument's profile and hands
 //! finished samples to the loop through a ring; commands come back through another. The loop's side
@@ -34,7 +34,7 @@
 //! # Ok::<(), muprime_drivers::OpenError>(())
 //! ```
 //!
-//! | room | purpose |
+//! | module | purpose |
 //! |---|---|
 //! | [`setup`] | the instruments' sections of a setup |
 //! | [`ports`] | the loop's side: port objects over rings |
@@ -51,7 +51,7 @@
 //! | [`can`] | the conversation in CAN messages, over [`slcan`] or [`socketcan`] |
 //! | [`text`] | the conversation in lines |
 //! | [`transport`] | what carries lines and streams: a serial line, TCP, datagrams |
-//! | [`trace`] | every byte on its way, for whoever looks for a fault |
+//! | [`trace`], [`peek`], [`remedy`] | every byte; instruments without a profile; remedies for bad answers |
 //! | [`chamber`] | the air around the rig, set and read beside the loop |
 //! | [`canopen`] | the conversation with a CANopen drive of CiA 402 |
 //! | [`serial`] | serial lines |

@@ -3,7 +3,7 @@
 //! Paper: Vezzoli et al., 'Friction Reduction Through Ultrasonic Vibration, Part 1: Modelling
 //! Intermittent Contact'. Equation numbers in these docs are that paper's.
 //!
-//! | room | purpose |
+//! | module | purpose |
 //! |---|---|
 //! | [`quantity`] | `PeakToPeak` and its one conversion |
 //! | [`condition`], [`finger`] | one operating point; the fingertip |
@@ -12,7 +12,7 @@
 //! | [`psi`] | Eqs. 16-20 |
 //! | [`psi_fit`] | its constant Psi* fitted, with an interval |
 //! | [`psi_star`] | Psi* of a rig's own passes, with an interval |
-//! | [`reading_evidence`] | which reading of the paper's w they support |
+//! | [`reading`], [`reading_evidence`] | how the paper's w may be read; which reading the passes support |
 //! | [`ridge`] | the finite element model of section 3 |
 //! | [`surrogate`], [`inverse`] | a table of the ridge that is quick to read; the amplitude for a wanted friction |
 //! | [`target`] | a wanted friction over position |
@@ -52,7 +52,6 @@ pub mod psi_star;
 pub mod quantity;
 pub mod reading;
 pub mod reading_evidence;
-
 pub mod ridge;
 pub mod rig_file;
 pub mod root;

@@ -1,6 +1,6 @@
 //! What happens while the rig runs: the cyclic loop and everything it may touch.
 //!
-//! | room | purpose |
+//! | module | purpose |
 //! |---|---|
 //! | [`ports`] | the seams `ForceSensor`, `Amplifier`, `Stage`, `SupplySwitch`, `SafetyInputs`; `Reading`, and `NoData` with its reason |
 //! | [`cycle`] | pure `step`: commands, safety, estimate, comparison |
@@ -15,7 +15,7 @@
 //! | [`wrap`] | ports around ports: faults |
 //! | [`stall_monitor`] | records when ordinary threads of the machine could not run |
 //! | [`replay`] | recorded cycles through the same code again |
-//! | [`recorder`] | rows, passes and events as MCAP; tolerant reading and recovery |
+//! | [`recorder`], `number` | rows, passes, events as MCAP, infinite numbers too; tolerant reading, recovery |
 //!
 //! ```
 //! use muprime_realtime::ports::Nanos;

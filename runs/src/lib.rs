@@ -1,10 +1,12 @@
 //! A friction sweep without an instrument: what people write, the order of the passes, virtual time, the run's folder, the report.
 //!
-//! Nothing here needs one system, a socket or a wall clock. The crate `rig` leads the same sweep over instruments.
+//! Nothing here needs a socket or a wall clock. The crate `rig` runs the same sweep over instruments. Downstream:
+//! `input` -> `setup`, `plan` -> `certificates` -> `sequence`, `supervisor` -> `session` -> `run_dir` -> `report`.
 //!
-//! | room | purpose |
+//! | module | purpose |
 //! |---|---|
-//! | [`input`], [`files`], [`mod@print`], [`leave`] | files that people wrote, refused with their place; how files are written; how the program prints, and ends |
+//! | [`input`], [`quantity`] | files that people wrote, refused with place; quantities with units |
+//! | [`files`], [`mod@print`], [`leave`] | how files are written; how the program prints, and ends |
 //! | [`setup`], [`plan`], [`fingertip`] | rigs, plans, fingertips, all checked with the place in the file |
 //! | [`calibrate`] | certificates from data; what only instruments give comes through a bench |
 //! | [`campaign`] | one plan with several tips, conditions and days; what the paper states, answered |
@@ -13,9 +15,9 @@
 //! | [`sequence`] | the order of a sweep: a pure state machine over the loop's rows |
 //! | [`supervisor`] | the one way to lead a loop: stop first, switch off, read back; and the loop in virtual time |
 //! | [`session`] | a sweep from its job to its summary, in virtual time |
-//! | [`ambient`] | levels of the air: who sets them, who reads them, who answers at the rig |
+//! | [`ambient`], [`exposure_left`] | levels of the air, set and read; what is left of a finger's exposure |
 //! | [`run_dir`], [`catalogue`] | a run's folder and its reader; the list of runs |
-//! | [`report`], [`compare`] | the pages of a run and of a verdict; two runs side by side |
+//! | [`report`], [`compare`], [`fidelity`] | pages; runs side by side; how faithfully a target was rendered |
 //! | [`verdict`] | a verdict for people at a terminal, and the plan of the next experiment |
 //! | [`version`] | what this program is: the build, and the models that it holds |
 //!

@@ -1,11 +1,11 @@
 //! The virtual rig: an independent world in the time domain, with what can be wrong with it.
 //!
-//! | room | purpose |
+//! | module | purpose |
 //! |---|---|
 //! | [`world`] | composes the bodies and steps them, in virtual or wall-clock time |
 //! | [`finger`], [`plate`], [`amplifier`], [`sensor`], [`stage`] | one body each |
 //! | [`contact`] | ridge on vibrating plate: exact, sampled, resolved, averaged |
-//! | [`channel`] | the way from an instrument to its reader, and its faults |
+//! | [`channel`], [`room`] | the way from an instrument to its reader; the air around the rig |
 //! | [`defects`] | what can be wrong with this world, one kind a file |
 //! | [`sealed`] | point tables whose cause only a label knows, and the oracle |
 //! | [`virtual_rig`] | the loop's three ports in process and in virtual time |

@@ -1,4 +1,4 @@
-//! What tests in wall-clock time share: judgements beside recorded stalls of the machine, and a bench behind real sockets.
+//! What tests in wall-clock time share: judgements beside stalls (`wall_time`), a `bench` behind sockets.
 
 pub mod bench;
 mod wall_time;
