@@ -89,7 +89,7 @@ fn the_page_of_errors_is_that_of_the_program() {
     );
 }
 
-/// No word of the banned list in the rooms that are clean.
+/// No word of the banned list in the files that are clean.
 #[test]
 fn no_banned_word_is_told_to_people() {
     let (read, wrong) = banned::look(&words::commands());

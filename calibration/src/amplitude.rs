@@ -1,6 +1,6 @@
 //! Amplitude: drive set-point to the peak-to-peak amplitude of the plate, where the finger touches it.
 //!
-//! | room | purpose |
+//! | module | purpose |
 //! |---|---|
 //! | [`vibrometer`] | waveform to amplitude and phase, with the vibrometer's own range and delay |
 //! | [`gain`] | set-point (or current) to amplitude |
@@ -24,7 +24,7 @@ use crate::regression::FitError;
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct AmplitudePoint {
     /// What was set: set-point in m, drive current in A, frequency in Hz, position in m or load in N, as the
-    /// room that takes the point says.
+    /// module that takes the point says.
     pub at: f64,
     /// Measured peak-to-peak amplitude in m.
     pub amplitude_pp_m: f64,

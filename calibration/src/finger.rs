@@ -1,7 +1,7 @@
 //! The fingertip: stiffness ([`stiffness`]) and friction without vibration ([`friction`]).
 //!
 //! The Young's modulus of the stratum corneum comes from a phase table by inverse analysis (Eq. 2), which
-//! is a room of its own.
+//! has its own module: [`crate::identify`].
 
 pub mod friction;
 pub mod springs;

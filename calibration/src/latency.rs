@@ -1,7 +1,7 @@
 //! Latency: delay and jitter of each channel against the stage, alignment between channels, clock drift.
 //!
 //! Delays of single edges (reversals of the stage, taps, bursts) come from [`crate::force::dynamics`] or
-//! from their correlation; this room makes of them one delay with its uncertainty, and a jitter.
+//! from their correlation; this module makes of them one delay with its uncertainty, and a jitter.
 
 pub mod clock;
 

@@ -1,7 +1,7 @@
 //! Calibrations, certificates and inverse analysis: what makes counts newtons, set-points micrometres and
 //! arrivals instants, each with an uncertainty that can be defended.
 //!
-//! | room | purpose |
+//! | module | purpose |
 //! |---|---|
 //! | [`force`] | dead weights to a matrix; zeros; noise; dynamics |
 //! | [`amplitude`] | drive to peak-to-peak amplitude; resonance; mode shape; droop |
@@ -13,7 +13,7 @@
 //! | [`prior`] | what certificates leave open, for the diagnosis |
 //! | [`regression`], [`uncertainty`] | least squares; GUM |
 //!
-//! The way through: data file -> a room's fit, which refuses what is unfit -> [`certificate::Outcome`] ->
+//! The way through: data file -> a module's fit, which refuses what is unfit -> [`certificate::Outcome`] ->
 //! [`certificate::Certificate`] (a sealed TOML file) -> [`certificate::Certificate::verify`] ->
 //! [`force::apply::ForceCalibration`] or [`amplitude::apply::AmplitudeCalibration`] in the loop.
 

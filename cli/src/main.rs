@@ -1,4 +1,4 @@
-//! The `muprime` command: parses its arguments and hands over to one file per subcommand in `cli/`.
+//! The `muprime` command: parses its arguments and hands over to one file per subcommand in `verbs/`.
 
 #![deny(clippy::print_stdout, clippy::print_stderr)]
 #![allow(
@@ -249,7 +249,7 @@ mod tests {
         if subs.is_empty() || !(path.is_empty() || command.is_subcommand_required_set()) {
             assert!(
                 command.get_after_help().is_some(),
-                "{path}: no example under --help; add one in cli/examples.rs"
+                "{path}: no example under --help; add one in cli/src/verbs/examples.txt"
             );
             into.push(path.to_string());
         }

@@ -1,6 +1,6 @@
 //! Which experiment next: the conditions, or the instrument action, that best part the leading hypotheses.
 //!
-//! | room | purpose |
+//! | module | purpose |
 //! |---|---|
 //! | [`grid`] | conditions that a plan can choose, within what the table has shown |
 //! | [`predictive`] | what each hypothesis expects there, with how surely it knows it |

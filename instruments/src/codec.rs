@@ -1,6 +1,6 @@
 //! Frames of the wires: one file a protocol. Pure bytes, no port.
 //!
-//! | room | purpose |
+//! | module | purpose |
 //! |---|---|
 //! | [`modbus_rtu`] | Modbus RTU: requests, answers, both directions |
 //! | [`stream`] | sensor streams without a request: sync bytes, length, checksum, resynchronisation |

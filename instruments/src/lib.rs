@@ -1,13 +1,13 @@
 //! Instrument profiles, codecs and golden vectors.
 //!
 //! One TOML file describes an instrument: its link, its frames, the signals in them, the set-points
-//! it takes, its faults, and golden byte vectors. The driver (crate `drivers`), the emulator (crate
-//! `sim`) and the generated documentation all stand on that one description, so they cannot drift
-//! apart; the vectors and the independent peers of the system tests say whether it is right.
+//! it takes, its faults, and golden byte vectors. The profiles themselves are files in drivers/profiles. The
+//! driver (crate `drivers`), the emulator (crate `sim`) and the generated documentation all use that one
+//! description; the vectors and the independent peers of the system tests say whether it is right.
 //!
 //! This crate is pure: bytes in, values out. It knows no socket, no clock and no file.
 //!
-//! | room | purpose |
+//! | module | purpose |
 //! |---|---|
 //! | [`schema`] | what may stand in a profile: the serde types, one field a key |
 //! | [`profile`] | a profile that was read, checked and compiled: names became indices |

@@ -1,5 +1,5 @@
 //! What may stand in a profile: one serde type a section, one field a key.
-//! A new key is a field of the section's type, in the room that bears the section's name.
+//! A new key is a field of the section's type, in the module that bears the section's name.
 //!
 //! Unknown keys are errors with their place in the file. The same types make the JSON Schema that
 //! editors use ([`json_schema`]). What these types cannot say (that a signal's frame exists, that

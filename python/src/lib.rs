@@ -1,7 +1,7 @@
-//! muprime in Python. What people call is `muprime/__init__.py`; here stands what it calls, one file a
-//! subject, each a thin door to the crates that the binary is made of. Long work lets the interpreter go on.
+//! muprime in Python. A call is `muprime/<subject>.py`, its binding `src/<subject>.rs`, its types
+//! `_muprime.pyi`. A binding is a thin layer over the crates of the binary. Long work releases the interpreter.
 //!
-//! | file | door to |
+//! | file | binding of |
 //! |---|---|
 //! | `laws` | friction laws on columns of conditions |
 //! | `ridge` | cases of the finite element ridge |

@@ -1,6 +1,6 @@
 //! The controller: a sweep over instruments, in wall-clock time, and the person at the rig. The one crate that needs Linux.
 //!
-//! | room | purpose |
+//! | module | purpose |
 //! |---|---|
 //! | [`session`] | a sweep over instruments from beginning to end |
 //! | [`wall_loop`] | the loop in wall-clock time: a thread of its own, instruments behind links |

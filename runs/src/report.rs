@@ -1,5 +1,13 @@
 //! The report of a run: one self-contained HTML page. Nothing comes from elsewhere, and without JavaScript it says the same.
 //! An error of a part of a page is one of the drawing library, unless it states another.
+//!
+//! | part of a page | module |
+//! |---|---|
+//! | a run; its head, events, traces, fidelity | `page`; [`about`], [`events`], [`traces`], [`fidelity`] |
+//! | a verdict; the law figure | [`diagnosis`]; `diagnosis/law` and `plots/verdict` |
+//! | two runs; more | [`comparison`]; [`groups`] |
+//! | figures; those that are worked with; published values | [`plots`]; `explore`; [`published`] |
+//! | text, tables; quantities; levels | [`html`]; [`human`]; `levels` |
 
 pub mod about;
 pub mod comparison;

@@ -1,5 +1,6 @@
-//! The order of a sweep: a pure state machine that eats rows and gives commands. It runs in virtual time and
-//! in wall-clock time alike, beside the loop, never in it.
+//! The order of a sweep: a pure state machine that consumes rows and gives commands, in virtual time and in
+//! wall-clock time alike, beside the loop, never in it. How long a pass settles and measures is
+//! [`PassTimes`] of the plan; only arming, zeroing, approach, rests and pauses have constants here.
 //!
 //! ```text
 //! Arm -> Zero -> [ Approach -> Settle -> Measure ]* -> Zero -> Done

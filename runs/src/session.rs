@@ -1,7 +1,7 @@
-//! A sweep from beginning to end: opens the rig, runs the loop, keeps what comes of it.
+//! A sweep from its job to its summary. Here in virtual time: in this thread, with the virtual rig's ports.
 //!
-//! Two ways, one sequence: in wall-clock time with the loop on a thread of its own and instruments behind drivers, or in
-//! virtual time in this thread with the virtual rig's ports.
+//! The crate `rig` (rig/src/session.rs) runs the same sequence in wall-clock time, with a thread for the loop
+//! and instruments behind drivers. Job, summary and [`Keeper`], which writes the run's folder, serve both.
 
 mod fast;
 pub mod keeper;

@@ -5,7 +5,7 @@
 //! its own. The set holds what a diagnoser may see (table, rig.toml, hidden conditions) apart from what only
 //! a scorer may (label and noise-free truth); [`Set::write`] puts them in two folders.
 //!
-//! | room | purpose |
+//! | module | purpose |
 //! |---|---|
 //! | [`design`] | which passes were made |
 //! | [`oracle`] | what the noise-free data could tell at best |

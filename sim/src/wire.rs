@@ -4,7 +4,7 @@
 //! It knows bytes and registers; the world knows forces and motion; a [`Quantity`] is all that they
 //! share. Several emulators of several protocols may serve one world at once.
 //!
-//! | room | purpose |
+//! | module | purpose |
 //! |---|---|
 //! | [`quantity`] | what of the world a profile may name |
 //! | [`device`] | one emulated instrument: registers from the world, commands into it |

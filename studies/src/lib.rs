@@ -1,6 +1,6 @@
 //! Studies: many cases, one table.
 //!
-//! | room | purpose |
+//! | module | purpose |
 //! |---|---|
 //! | [`cases`] | many cases: here at once, or an idempotent worker, engines, one table (feature `cases`) |
 //! | [`validation`] | the blind score of the diagnosis, and the fault bench of the controller |

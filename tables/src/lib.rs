@@ -1,6 +1,6 @@
 //! What comes from other programs and goes to them, and the check of any file.
 //!
-//! | room | purpose |
+//! | module | purpose |
 //! |---|---|
 //! | [`mod@import`] | foreign tables made into point tables |
 //! | [`export`] | a run's passes and record in the formats of other programs |

@@ -1,4 +1,4 @@
-//! Words that no text for people has: Germanisms, private metaphors, identifiers. The rooms below are clean and stay so.
+//! Words that no text for people has: Germanisms, private metaphors, identifiers. The files below stay clean.
 
 use super::words::Commands;
 use tests::file;
@@ -73,7 +73,7 @@ pub fn in_line(line: &str) -> Option<&'static str> {
     })
 }
 
-/// Lines read, and those with a banned word: help of every command, a run's and a diagnosis' terminal lines, errors, rooms.
+/// Lines read, and those with a banned word: help of every command, a run's and a diagnosis' terminal lines, errors, files.
 pub fn look(commands: &Commands) -> (usize, Vec<String>) {
     let mut texts: Vec<(String, String)> =
         commands.iter().map(|(name, help)| (format!("muprime {name} --help"), help.clone())).collect();

@@ -1,6 +1,6 @@
 //! Candidate effects: what may part reality from the baseline model.
 //!
-//! | room | purpose |
+//! | module | purpose |
 //! |---|---|
 //! | [`mod@library`] | the candidate causes, one file each, with the facts that others need of them |
 //! | [`effect`] | what a cause is: place, laws, parameters with their priors, needs, aliases, checks |

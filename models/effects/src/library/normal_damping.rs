@@ -1,4 +1,4 @@
-//! The normal spring is retarded: it pushes harder on the way up and lags on the way down.
+//! The normal spring has a retardation time: it pushes harder on the way up and lags on the way down.
 
 use super::prelude::*;
 
