@@ -4,9 +4,8 @@
 //! ([`Constants::set`], `muprime blind --constant NAME=VALUE`) or scale it ([`Constants::scale`], for
 //! docs/diagnosis/sensitivity.md). The table of docs/diagnosis/constants.md is [`markdown`], held equal by a test.
 //!
-//! What a source says: a reference to the literature; `contract` where docs/contract.md defines it; `numerical` where it
-//! is an accuracy or an effort; `development` where it was set on development sets, with what they showed; `judgement`
-//! where it was chosen without a measurement and the sensitivity table is all there is.
+//! Sources: a reference; `contract`: docs/contract.md; `numerical`: an accuracy or effort; `development`: set on
+//! development sets, with what they showed; `judgement`: no measurement, the sensitivity table is all there is.
 
 mod value;
 

@@ -1,4 +1,4 @@
-//! The table as the diagnosis sees it: what was measured, and what the design can show.
+//! The table: what was measured, and what the design can show. docs/diagnosis/model.md, section 1.
 
 use effects::{Design, Need};
 use models::condition::Condition;

@@ -1,4 +1,4 @@
-//! Which: from probabilities to a verdict, with the causes that the data cannot separate.
+//! From probabilities to a verdict and its alias class. docs/diagnosis/model.md, section 9.
 
 use crate::departure::Freedom;
 use crate::evidence::{Posterior, laplace};

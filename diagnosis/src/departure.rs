@@ -1,4 +1,4 @@
-//! How a hypothesis may depart from its form.
+//! How a hypothesis may depart from its form. docs/diagnosis/model.md, section 5.
 //!
 //! A cause's change may bend smoothly over all covariates, in proportion to itself. And where a cause acts
 //! on one input (the amplitude, say) by a size that is a function of few covariates (of time alone), that

@@ -1,5 +1,5 @@
 //! What an unknown departure looks like: a jump, a bump or a period, with its place, size and odds; and which
-//! causes are sure though others act beside them, or take turns with them in the list.
+//! causes are sure though others act beside them. docs/diagnosis/model.md, section 10.
 
 use crate::decision::{Decision, Verdict};
 use crate::fitted::Fitted;

@@ -1,4 +1,4 @@
-//! The open set: what any smooth departure from the baseline would look like, whatever its cause.
+//! The open set: any smooth departure from the baseline. docs/diagnosis/model.md, section 6.
 //!
 //! `y = baseline + friction-like part + direction-odd part + white excess + noise`, each part Gaussian with
 //! its scale on a fixed grid, so that no scale is fitted. Its evidence is what a named effect has to beat.

@@ -1,4 +1,4 @@
-//! The evidence of a hypothesis whose cause need not have exactly the library's form.
+//! The evidence of a hypothesis of which the form is not exact. docs/diagnosis/model.md, section 7.
 //!
 //! `y = m(phi, theta) + s D delta + noise`: D is the effect's change net of what recalibrating the baseline
 //! could imitate, delta a smooth Gaussian process of unit variance over the operating space, s on a grid.

@@ -1,4 +1,4 @@
-//! The regression problem: one hypothesis on a table, in coordinates that are standard normal a priori.
+//! A hypothesis on a table, in coordinates that are N(0, 1) a priori. docs/diagnosis/model.md, section 2.
 
 use crate::constants::Constants;
 use crate::data::RigFile;

@@ -1,4 +1,4 @@
-//! Everything that was fitted to a table, and how probable each hypothesis is.
+//! All that was fitted to a table; how probable each hypothesis is. docs/diagnosis/model.md, section 8.
 
 use crate::data::RigFile;
 use crate::departure::{Basis, Kernels};

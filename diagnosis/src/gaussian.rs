@@ -1,4 +1,4 @@
-//! Gaussian algebra with a diagonal and a low-rank part: `C = diag(var) + Phi Phi'`.
+//! Gaussian algebra of low rank: `C = diag(var) + Phi Phi'`. docs/diagnosis/model.md, section 7.
 
 use nalgebra::{Cholesky, DMatrix, DVector, Dyn};
 

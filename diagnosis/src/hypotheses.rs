@@ -1,4 +1,4 @@
-//! The hypotheses: no gap, each effect, pairs, and the open set; fitted, with their probabilities.
+//! The hypotheses and the order of their fits. docs/diagnosis/model.md, section 4.
 
 use crate::constants::Constants;
 use crate::data::{RigFile, Table};

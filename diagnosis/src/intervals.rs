@@ -1,4 +1,4 @@
-//! Parameter intervals by profile likelihood, with their shape.
+//! Parameter intervals by profile likelihood, with their shape. docs/diagnosis/model.md, section 10.
 
 use crate::departure::Basis;
 use crate::evidence::Posterior;

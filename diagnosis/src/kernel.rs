@@ -1,4 +1,4 @@
-//! Smooth functions over the operating space: standardised covariates and a low-rank kernel on them.
+//! Smooth functions of standardised covariates: a low-rank kernel. docs/diagnosis/model.md, section 5.
 
 use crate::constants::Constants;
 use crate::data::Table;

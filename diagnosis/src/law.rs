@@ -1,4 +1,4 @@
-//! A base law in place of the spring-slider.
+//! A base law in place of the spring-slider. docs/diagnosis/model.md, section 2.
 //!
 //! It is read once for each pass, at the nominal mu_0. What recalibration and candidate effects do is the
 //! change that they make on the spring-slider, and it is added to the force of the law. The law's own

@@ -1,5 +1,5 @@
 //! Where a hypothesis keeps what in its vector of coordinates: the baseline's parameters first, then each
-//! effect's own, the size before the shapes.
+//! effect's own, the size before the shapes. docs/diagnosis/model.md, section 2.
 
 use crate::member::Member;
 use std::ops::Range;

@@ -1,4 +1,4 @@
-//! Bounded least squares: Levenberg (1944) and Marquardt (1963), projected onto the parameters' ranges.
+//! Least squares within bounds (Levenberg 1944, Marquardt 1963). docs/diagnosis/model.md, section 7.
 
 use crate::fit::{Member, Problem};
 use nalgebra::{DMatrix, DVector};

@@ -1,4 +1,4 @@
-//! The gap left on parts of the operating space that the fit did not see.
+//! The gap left in regions that the fit did not see. docs/diagnosis/model.md, section 9, steps 2 and 3.
 
 use crate::constants::Constants;
 use crate::departure::Freedom;

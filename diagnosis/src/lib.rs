@@ -17,14 +17,12 @@
 //! | [`structure`] | jumps, bumps, periods and other departures that no smooth map follows |
 //! | [`intervals`], [`pulls`] | profile intervals; how far the stiffnesses went from their calibration |
 //! | [`locate`] | which part of the operating space, and of the rig, carries the gap |
-//! | [`shrinkage`], [`predict`] | how far the gap shrinks on held-out passes; the predictive distribution |
-//! | [`novelty`], `run_shifts` | predictions in a run that the table lacks, or later; in a run that it has |
+//! | [`shrinkage`], [`predict`], [`novelty`], `run_shifts` | held-out passes; predictions, also in runs |
 //! | [`next`], [`power`] | the experiment that separates the leading hypotheses; detectable sizes |
 //! | [`reading`] | which reading of the paper's w the passes favour |
 //! | [`describe`] | what an unknown departure looks like; causes that are sure all the same |
 //! | [`timing`] | what the edges in a run's record say of lags and shifts in time |
-//! | [`verdict`], [`document`], [`remarks`] | the report, its JSON, remarks beside it |
-//! | [`certificates`], [`saved`] | certificates in doubt; the corrected model for a run |
+//! | [`verdict`], [`document`], [`remarks`], [`certificates`], [`saved`] | report, JSON, remarks, model |
 //!
 //! docs/diagnosis/model.md states the whole model once, with the module of each section. An example:
 //!

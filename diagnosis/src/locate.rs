@@ -1,4 +1,4 @@
-//! Where: the parts of the operating space that carry the gap, and the part of the rig.
+//! Where the gap is: conditions, and the part of the rig. docs/diagnosis/model.md, section 10.
 
 mod partition;
 

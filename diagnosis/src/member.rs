@@ -1,4 +1,4 @@
-//! One cause in one of its laws: the letter from which hypotheses are spelled.
+//! One cause in one of its laws: a part of a hypothesis. docs/diagnosis/model.md, section 4.
 
 use effects::{Design, Law, Parameter, Place};
 

@@ -1,4 +1,4 @@
-//! Which experiment next: the conditions, or the instrument action, that best part the leading hypotheses.
+//! The next experiment: what best separates the leading hypotheses. docs/diagnosis/model.md, section 10.
 //!
 //! | module | purpose |
 //! |---|---|

@@ -1,4 +1,4 @@
-//! The variance of each pass: stated repeatability, checked against replicates, never fitted to a residual.
+//! The variance of each pass: never fitted to a cause. docs/diagnosis/model.md, section 3.
 
 use crate::constants::Constants;
 use crate::data::{RigFile, Table};

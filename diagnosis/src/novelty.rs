@@ -1,11 +1,10 @@
-//! Predictions of what the table has nothing of: a run of its own, or a time after its end.
+//! Predictions in a run that the table does not have, or after its end. docs/diagnosis/model.md, section 10.
 //!
-//! A fit knows how passes scatter about it, not how far the next set-up, or the next hour, will lie from those that it has seen.
-//! That is measured instead, as in conformal prediction: each run is left out and predicted from the others, the end of the
-//! table from its beginning. Where 95 % of the errors need more deviations than a normal number does, the deviation stated
-//! for such conditions is widened by as much, and it is no less than those errors are as shares of the force: what is left out
-//! may leave a law so open that nothing misses. Of runs it is their root mean square with Student's quantile for so few, of
-//! later times the worst.
+//! A fit shows how passes scatter about it, not how far the next set-up, or the next hour, will lie from
+//! those before. That is measured instead, as in conformal prediction: each run is left out and predicted
+//! from the others, the end of the table from its beginning. The deviation is widened by what 95 % of the
+//! errors need, and is at least their share of the force: of runs by root mean square and Student's quantile,
+//! of later times the worst.
 
 use crate::data::{RigFile, Table};
 use crate::fitted::Fitted;

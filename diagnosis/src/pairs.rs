@@ -1,4 +1,4 @@
-//! Two causes at once: pairs grown from the best singles, and sought again in every law where they look best.
+//! Two causes at once: pairs grown from the best singles. docs/diagnosis/model.md, section 7.
 
 use crate::departure::Basis;
 use crate::evidence::{Posterior, averaged_over_form, laplace, middle_freedom};

@@ -1,4 +1,4 @@
-//! What a verdict of no gap would have seen: of each effect the size from which this table would claim it.
+//! From which size of each effect this table would claim a gap. docs/diagnosis/model.md, section 10.
 
 use crate::evidence::{Posterior, net_change};
 use crate::fitted::{Candidate, Fitted};

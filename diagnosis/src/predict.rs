@@ -1,4 +1,4 @@
-//! The verdict's model at any condition: what `--predict` writes and what held-out passes are judged by.
+//! The verdict's model at any condition: `--predict`, held-out passes. docs/diagnosis/model.md, section 10.
 
 use crate::data::{RigFile, Table};
 use crate::decision::Verdict;

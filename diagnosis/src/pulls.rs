@@ -1,4 +1,4 @@
-//! How far the recalibrated baseline stands from what the finger's calibration states.
+//! How far the stiffnesses are from their calibration. docs/diagnosis/model.md, section 10.
 //!
 //! Only the groups `Fn / (k_n w)` and `k_l U / (pi f mu0 k_n w)` enter the baseline (Eqs. 6-15). So an amplitude whose
 //! scale is wrong by a factor is, pass for pass, a normal stiffness wrong by that factor: the stiffness takes it up, no

@@ -1,5 +1,5 @@
 //! Shifts of runs that the table has, and what lasts within them: a further pass of such a run lies where its
-//! run does, and near where its neighbours do.
+//! run does, and near where its neighbours do. docs/diagnosis/model.md, section 10.
 
 use crate::data::Table;
 use crate::fitted::Fitted;

@@ -1,15 +1,15 @@
 //! The scatter of real passes: how wrong the stated repeatability is, what shifts between runs, what lasts
-//! from pass to pass, and which passes do not belong.
+//! from pass to pass, and which passes do not belong. docs/diagnosis/model.md, section 3.
 //!
-//! A statement of repeatability is a prior, not a truth. A flexible surface, the open set's, stands for
-//! whatever friction may do over the operating space; what single passes leave beside it is scatter:
+//! A statement of repeatability is a prior. A flexible surface, the open set's, stands for whatever friction
+//! may do; what single passes leave beside it is scatter:
 //!
 //! `y = surface + level * shift[run] + e`, `shift ~ N(0, run_sd^2)`,
 //! `e ~ (1 - share) N(0, scale^2 v) + share Cauchy(0, 5 scale sqrt(v))`, correlated from pass to pass.
 //!
-//! Scales climb the marginal likelihood of the surface; responsibilities come from the residual of each pass about a surface
-//! that did not see it (Rasmussen & Williams 2006, section 5.4.2), in turn. A pass counts by its responsibility, so the
-//! answer changes smoothly with the number of bad passes. All hypotheses share the result: none has a scatter of its own.
+//! Scales climb the marginal likelihood of the surface; responsibilities come from the residual of each pass
+//! about a surface that did not see it, in turn. A pass counts by its responsibility, so the answer changes
+//! smoothly with the number of bad passes. All hypotheses share the result.
 
 pub(crate) mod clusters;
 mod lasting;

@@ -1,4 +1,4 @@
-//! How far the gap shrinks on passes held out by group.
+//! How far the gap shrinks on passes held out by group. docs/diagnosis/model.md, section 10.
 
 use crate::data::{RigFile, Table};
 use crate::draws::{deviate, split_mix};

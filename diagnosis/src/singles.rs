@@ -1,4 +1,4 @@
-//! One effect at a time: every law sought from global starts, and the laws of an effect put together.
+//! One effect at a time: every law sought, then put together. docs/diagnosis/model.md, section 4.
 
 use crate::data::Table;
 use crate::departure::Basis;

@@ -1,4 +1,4 @@
-//! Global starts: a coarse scan of each law over its sizes and shapes, then local fits of the best few.
+//! Global starts: a scan of each law, then fits of the best few. docs/diagnosis/model.md, section 7.
 
 use crate::fit::{Member, Problem};
 use crate::gaussian::Covariance;

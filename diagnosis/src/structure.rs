@@ -1,10 +1,10 @@
 //! Whether what the recalibrated baseline leaves is scatter: runs, steps, spots and periods along the order
-//! of measurement and along each covariate, held against shuffled passes.
+//! of measurement and along each covariate, compared with shuffled passes. docs/diagnosis/model.md, section
+//! 6.
 //!
-//! Smooth departures and the library's causes have their own evidence. What is sudden, periodic or local has none there: a window that
-//! slides over the passes in the order of each covariate finds steps and spots (a scan statistic), a periodogram over time and place
-//! finds what repeats. The strongest of all is held against the same of passes that are shuffled and turned either way, so the level is
-//! that of the whole family; its tail is that of the largest of many (Gumbel).
+//! A window that slides over the passes in the order of each covariate finds steps and spots (a scan
+//! statistic), a periodogram over time and place what repeats. The level is that of the family; its tail is
+//! that of the largest of many (Gumbel).
 
 mod form;
 pub mod laid;

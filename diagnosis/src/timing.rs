@@ -1,11 +1,10 @@
-//! What the edges in a run's record say of time: does the lateral force come late, by how much, as a lag or
-//! as a delay?
+//! What the edges in a run's record say of time: how late the lateral force comes, as a lag or as a delay.
 //!
 //! An edge is a change of the amplitude, or a turn of the stage, while the finger slides. The contact's own
-//! response is known: friction follows the amplitude as it is read back, by the law; and the finger on its
-//! compliant holder sticks until it is stretched. What the channel shows later than that, behind its stated
-//! filter, is the sensor's or the clock's. Each edge has its own level, size and drift, so that a cause
-//! which changes friction changes no time.
+//! response is known: friction follows the amplitude by the law, and the finger on its compliant holder
+//! sticks until it is stretched. What the channel shows later than that, behind its stated filter, is the
+//! sensor's or the clock's. Each edge has its own level, size and drift, so a cause which changes friction
+//! changes no time.
 
 mod fit;
 mod response;

@@ -5,8 +5,8 @@
 //!
 //! | module | purpose |
 //! |---|---|
-//! | [`input`], [`quantity`] | files that people wrote, refused with place; quantities with units |
-//! | [`files`], [`mod@print`], [`leave`] | how files are written; how the program prints, and ends |
+//! | [`input`], [`quantity`], [`files`] | files of people, refused with their place; units; files that are written |
+//! | [`mod@print`], [`leave`], [`version`] | how the program prints, and ends; the build and its models |
 //! | [`setup`], [`plan`], [`fingertip`] | rigs, plans, fingertips, all checked with the place in the file |
 //! | [`calibrate`] | certificates from data; what only instruments give comes through a bench |
 //! | [`campaign`] | one plan with several tips, conditions and days; what the paper states, answered |
@@ -19,7 +19,6 @@
 //! | [`run_dir`], [`catalogue`] | a run's folder and its reader; the list of runs |
 //! | [`report`], [`compare`], [`fidelity`] | pages; runs side by side; how faithfully a target was rendered |
 //! | [`verdict`] | a verdict for people at a terminal, and the plan of the next experiment |
-//! | [`version`] | what this program is: the build, and the models that it holds |
 //!
 //! ```
 //! use muprime_runs::plan::Plan;

@@ -1,13 +1,12 @@
 //! The report of a run: one self-contained HTML page. Nothing comes from elsewhere, and without JavaScript it says the same.
 //! An error of a part of a page is one of the drawing library, unless it states another.
 //!
-//! | part of a page | module |
+//! | module | part of a page |
 //! |---|---|
-//! | a run; its head, events, traces, fidelity | `page`; [`about`], [`events`], [`traces`], [`fidelity`] |
-//! | a verdict; the law figure | [`diagnosis`]; `diagnosis/law` and `plots/verdict` |
-//! | two runs; more | [`comparison`]; [`groups`] |
-//! | figures; those that are worked with; published values | [`plots`]; `explore`; [`published`] |
-//! | text, tables; quantities; levels | [`html`]; [`human`]; `levels` |
+//! | `page`, [`about`], [`events`], [`traces`], [`fidelity`], `explore` | a run |
+//! | [`diagnosis`] | a verdict; law figure: `diagnosis/law` and `plots/verdict` |
+//! | [`comparison`], [`groups`] | two runs, more |
+//! | [`plots`], [`published`], [`html`], [`human`], `levels` | figures, published values, text, quantities, levels |
 
 pub mod about;
 pub mod comparison;

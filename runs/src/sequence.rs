@@ -1,6 +1,5 @@
-//! The order of a sweep: a pure state machine that consumes rows and gives commands, in virtual time and in
-//! wall-clock time alike, beside the loop, never in it. How long a pass settles and measures is
-//! [`PassTimes`] of the plan; only arming, zeroing, approach, rests and pauses have constants here.
+//! The order of a sweep: a pure state machine over rows, beside the loop, in virtual and wall-clock time.
+//! How long a pass settles and measures is `plan::PassTimes`; arming, zero, approach, pause are constants.
 //!
 //! ```text
 //! Arm -> Zero -> [ Approach -> Settle -> Measure ]* -> Zero -> Done

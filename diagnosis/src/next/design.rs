@@ -2,9 +2,9 @@
 //!
 //! Two hypotheses of probabilities p and q are confused by at most `sqrt(p q) exp(-B)`, B the Bhattacharyya
 //! distance of what they expect of all chosen passes together. For Gaussians of like covariance B is an
-//! eighth of the sum of both Kullback-Leibler divergences, and those add up from pass to pass, each given the
-//! passes before it. The design minimises the sum over all pairs: a pair that is separated stops drawing passes,
-//! a condition that a hypothesis has learnt stops telling.
+//! eighth of the sum of both Kullback-Leibler divergences, which add up from pass to pass, each given those
+//! before it. The design minimises the sum over all pairs: one that is separated stops drawing passes, a
+//! learnt condition too.
 
 use super::predictive::Predictive;
 use nalgebra::{DMatrix, DVector};

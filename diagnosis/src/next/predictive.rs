@@ -1,8 +1,7 @@
 //! What a hypothesis expects at conditions that were not measured, and how surely, correlated between conditions.
 //!
-//! A cause is uncertain in its parameters and in its smooth departure from form; the open set in its two
-//! smooth parts; all in the baseline. A second pass at a condition therefore tells less than the first: what
-//! the first left open is noise, while the hypothesis' own doubt about that condition is gone.
+//! A cause is uncertain in its parameters and its departure from form, the open set in its smooth parts, all
+//! in the baseline. A second pass at a condition adds less: the hypothesis' own doubt about it is gone.
 
 use crate::data::RigFile;
 use crate::decision::Decision;

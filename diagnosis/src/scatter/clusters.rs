@@ -1,10 +1,9 @@
 //! Whether values at passes cluster somewhere in the operating space: a permutation test over cells of each
 //! covariate and of each two.
 //!
-//! Scatter falls anywhere. A departure that no smooth surface follows (an edge, a spot, a step, the lightest
-//! load with the plate still) does not: it has a mean of its own in some cell. The strongest of all
-//! covariates is held against the same of passes that are shuffled and turned either way, so the level is
-//! that of the whole family.
+//! Scatter falls anywhere. A departure that no smooth surface follows (an edge, a spot, a step) has a mean of
+//! its own in some cell. The strongest of all covariates is compared with that of passes shuffled and turned
+//! either way, so the level is that of the whole family.
 
 use crate::draws::split_mix;
 use crate::fit::Problem;

@@ -1,9 +1,7 @@
 //! Scatter that lasts beyond what is stated: an autoregression in the order of measurement, by its slow part.
 //!
-//! Independent passes would let it look like a drift: at a correlation of 0.7 its slow part has nearly six
-//! times the power of independent scatter. Only that part matters, so the slowest cosines have columns of
-//! their own, with the power of the autoregression, and the rest counts as independent. The work stays linear
-//! in the number of passes.
+//! The slowest cosines have columns of their own, with the power of the autoregression, beside the
+//! independent scatter; what is beyond them is not added. Why they are needed: `serial`.
 
 use crate::constants::Constants;
 use crate::data::Table;

@@ -1,9 +1,8 @@
-//! Scatter that lasts from pass to pass: its correlation, and its slow part as columns.
+//! Scatter of neighbours that is correlated: its correlation, and its slow part as columns.
 //!
-//! The scatter is a first-order autoregression in the order of measurement. Independent passes would let its
-//! slow part look like a drift: at correlation 0.7 it has nearly six times the power of independent scatter.
-//! Only that part matters, so the slowest cosines have columns of their own (their power is the
-//! autoregression's), and the rest counts as independent. The work stays linear in the number of passes.
+//! Independent passes would let the slow part look like a drift: at correlation 0.7 it has nearly six times
+//! the power of independent scatter. So the slowest cosines have columns of their own, with the power of the
+//! autoregression, and the rest counts as independent. The work stays linear in the number of passes.
 
 use crate::constants::Constants;
 use crate::data::Table;

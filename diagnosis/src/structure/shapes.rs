@@ -3,7 +3,7 @@
 //! `y = baseline + A h + scatter`, h the shape at one place, width or period, A ~ N(0, s^2) with s on a grid,
 //! the nuisances linear. The integral is exact, and the evidence of a shape is its mean over places. It acts
 //! on friction (turning with the direction) or on the sensor. Scatter that lasts can take up any of them, so
-//! each is also tried where independent scatter is all there is.
+//! each is also tried where independent scatter is all there is. docs/diagnosis/model.md, section 6.
 
 use super::form::{Form, Placement, Way};
 use crate::evidence::Posterior;
