@@ -8,13 +8,6 @@
 #![allow(clippy::disallowed_methods, reason = "it says how long each set took")]
 #![allow(missing_docs, reason = "a study, not a library")]
 
-use std::collections::BTreeMap;
-use std::error::Error;
-use std::fs;
-use std::path::{Path, PathBuf};
-use std::sync::Arc;
-use std::time::Instant;
-
 use diagnosis::constants::Constants;
 use diagnosis::data::{RigFile, Table};
 use diagnosis::decision::decide;
@@ -23,6 +16,12 @@ use diagnosis::verdict::{Diagnosis, diagnose};
 use models::pass::read_passes;
 use rayon::prelude::*;
 use serde::{Deserialize, Serialize};
+use std::collections::BTreeMap;
+use std::error::Error;
+use std::fs;
+use std::path::{Path, PathBuf};
+use std::sync::Arc;
+use std::time::Instant;
 
 #[derive(Deserialize)]
 struct Truth {

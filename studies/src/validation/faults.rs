@@ -11,9 +11,8 @@ mod tamper;
 
 pub use bench::{Core, Found, Scene, Strike, run, run_with};
 pub use rows::{Expect, FaultRow, Moment, Pace, ROWS};
-pub use search::Tally;
-
 use runs::out;
+pub use search::Tally;
 
 /// Worst reactions beside their bounds, in cycles of 1 ms.
 pub fn table(tally: &Tally) {
