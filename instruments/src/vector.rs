@@ -3,6 +3,7 @@
 //! A vector is decoded and compared; where the frame's bytes are all covered by signals it is
 //! encoded again as well. The same vectors are put to independent peers by the system tests.
 
+pub use crate::codec::from_hex;
 use crate::error::ProfileError;
 use crate::field::NumberType;
 use crate::profile::{FrameId, FrameKind, Profile};
@@ -75,7 +76,7 @@ impl Profile {
         }
         if which < polls {
             self.decode(FrameId(which), &bytes, &mut values).map_err(|e| error(e.to_string()))?;
-            self.check_frame(which, &bytes).map_err(error)?;
+            self.misfit(which, &bytes).map_or(Ok(()), |misfit| Err(error(misfit)))?;
         } else if bytes.len() != 2 * usize::from(d.write[which - polls].count) {
             return Err(error(format!(
                 "the block has {} registers, the vector {} bytes",
@@ -117,14 +118,11 @@ impl Profile {
         !vector.expect.as_ref().is_empty() && vector.expect.as_ref().keys().all(stands)
     }
 
-    /// The bytes of a stream's frame must be one that the driver would take: its sync bytes, and its check.
-    fn check_frame(&self, which: usize, bytes: &[u8]) -> Result<(), String> {
+    /// Why the driver would not take the bytes as a stream's frame: its sync bytes, or its check.
+    fn misfit(&self, which: usize, bytes: &[u8]) -> Option<String> {
         let stream = matches!(self.frames().get(which).map(|frame| &frame.kind), Some(FrameKind::Stream));
         let shape = self.description.stream.as_ref().filter(|_| stream).and_then(|stream| stream.shape());
-        match shape.and_then(|shape| shape.misfit(bytes)) {
-            Some(misfit) => Err(misfit),
-            None => Ok(()),
-        }
+        shape.and_then(|shape| shape.misfit(bytes))
     }
 
     /// The decoded values, encoded over the vector's bytes, must leave them as they are.
@@ -155,18 +153,4 @@ fn bytes_of(vector: &Vector) -> Result<Vec<u8>, String> {
         (None, Some(hex)) => from_hex(hex).ok_or_else(|| format!("`{hex}` is not hexadecimal bytes")),
         _ => Err("a vector needs one of `registers`, `hex` and `line`".into()),
     }
-}
-
-/// Bytes from hexadecimal digits; spaces are allowed anywhere.
-pub fn from_hex(text: &str) -> Option<Vec<u8>> {
-    let digits: Option<Vec<u8>> = text
-        .chars()
-        .filter(|c| !c.is_whitespace())
-        .map(|c| c.to_digit(16).and_then(|d| u8::try_from(d).ok()))
-        .collect();
-    let digits = digits?;
-    digits
-        .len()
-        .is_multiple_of(2)
-        .then(|| digits.chunks_exact(2).map(|pair| pair[0] << 4 | pair[1]).collect())
 }

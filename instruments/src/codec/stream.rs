@@ -98,7 +98,7 @@ impl Cutter {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::vector::from_hex;
+    use crate::codec::from_hex;
 
     fn ft300() -> Shape {
         Shape {

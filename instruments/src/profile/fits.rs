@@ -5,9 +5,9 @@ mod frames;
 
 use super::compile::Compiler;
 use super::{Frame, FrameKind};
+use crate::codec::from_hex;
 use crate::error::ProfileError;
 use crate::schema::{Init, LinkKind, Role, Set, Table};
-use crate::vector::from_hex;
 
 /// What a role needs: signals, and set-points.
 const NEEDS: &[(Role, &[&str], &[&str])] = &[
