@@ -17,9 +17,9 @@ pub struct ProfileError {
 
 impl ProfileError {
     /// An error at `span` of `text`.
-    pub fn at(text: &str, span: Option<Range<usize>>, message: impl Into<String>) -> Self {
+    pub fn at(text: &str, span: Option<Range<usize>>, message: impl ToString) -> Self {
         let place = span.as_ref().map(|span| line_and_column(text, span.start));
-        Self { message: message.into(), help: String::new(), span, place }
+        Self { message: message.to_string(), help: String::new(), span, place }
     }
 
     /// The same error with a remedy.

@@ -59,17 +59,37 @@ const LEVELS: [&[(&str, Operator)]; 7] = [
 /// Brackets and signs deeper than this are refused, so that a hostile file cannot exhaust the stack.
 const DEEPEST: usize = 40;
 
+/// Text that is no expression.
+#[derive(Debug, Clone, PartialEq, Eq, thiserror::Error)]
+#[allow(missing_docs, reason = "the message of an error says what it is")]
+pub enum ExpressionError {
+    #[error("{what} expected at character {at}")]
+    Expected { what: &'static str, at: usize },
+    #[error("{what} expected after {after}")]
+    ExpectedAfter { what: &'static str, after: &'static str },
+    #[error("unexpected `{rest}` at character {at}")]
+    Unexpected { rest: String, at: usize },
+    #[error("nested more than {DEEPEST} deep")]
+    TooDeep,
+    #[error("`{word}` is not {kind}")]
+    Number { word: String, kind: &'static str },
+    #[error("no signal is called `{0}`")]
+    UnknownSignal(String),
+}
+
+type Parsed<T> = Result<T, ExpressionError>;
+
 impl Expression {
     /// Compiles `text`; `index` gives a signal's place by its name.
     ///
     /// # Errors
     /// Says what was expected, and at which character.
-    pub fn compile(text: &str, index: &dyn Fn(&str) -> Option<usize>) -> Result<Self, String> {
+    pub fn compile(text: &str, index: &dyn Fn(&str) -> Option<usize>) -> Result<Self, ExpressionError> {
         let mut parser = Parser { text, at: 0, depth: 0, index };
         let node = parser.level(0)?;
         parser.skip_space();
         if parser.at < text.len() {
-            return Err(format!("unexpected `{}` at character {}", &text[parser.at..], parser.at + 1));
+            return Err(ExpressionError::Unexpected { rest: parser.rest().into(), at: parser.at + 1 });
         }
         Ok(Self(node))
     }
@@ -145,7 +165,7 @@ impl Parser<'_> {
         found
     }
 
-    fn level(&mut self, level: usize) -> Result<Node, String> {
+    fn level(&mut self, level: usize) -> Parsed<Node> {
         let Some(operators) = LEVELS.get(level) else { return self.unary() };
         let mut left = self.level(level + 1)?;
         'more: loop {
@@ -164,10 +184,10 @@ impl Parser<'_> {
         }
     }
 
-    fn unary(&mut self) -> Result<Node, String> {
+    fn unary(&mut self) -> Parsed<Node> {
         self.depth += 1;
         if self.depth > DEEPEST {
-            return Err(format!("nested more than {DEEPEST} deep"));
+            return Err(ExpressionError::TooDeep);
         }
         self.skip_space();
         let node = if !self.rest().starts_with("!=") && self.take("!") {
@@ -181,14 +201,16 @@ impl Parser<'_> {
         Ok(node)
     }
 
-    fn atom(&mut self) -> Result<Node, String> {
+    /// Takes `token`, or refuses it by the place where it should be.
+    fn demand(&mut self, token: &str, refusal: impl FnOnce(usize) -> ExpressionError) -> Parsed<()> {
+        if self.take(token) { Ok(()) } else { Err(refusal(self.at + 1)) }
+    }
+
+    fn atom(&mut self) -> Parsed<Node> {
         if self.take("(") {
             let inner = self.level(0)?;
-            return if self.take(")") {
-                Ok(inner)
-            } else {
-                Err(format!("`)` expected at character {}", self.at + 1))
-            };
+            self.demand(")", |at| ExpressionError::Expected { what: "`)`", at })?;
+            return Ok(inner);
         }
         self.skip_space();
         let start = self.at;
@@ -199,28 +221,26 @@ impl Parser<'_> {
         let word = &self.text[start..start + length];
         self.at += length;
         if word.is_empty() {
-            return Err(format!("a number or the name of a signal expected at character {}", start + 1));
+            let what = "a number or the name of a signal";
+            return Err(ExpressionError::Expected { what, at: start + 1 });
         }
+        let wrong = |kind| ExpressionError::Number { word: word.into(), kind };
         if let Some(hex) = word.strip_prefix("0x") {
-            let number = u32::from_str_radix(hex, 16)
-                .map_err(|_| format!("`{word}` is not a hexadecimal number of 32 bits"))?;
+            let number = u32::from_str_radix(hex, 16);
+            let number = number.map_err(|_| wrong("a hexadecimal number of 32 bits"))?;
             return Ok(Node::Number(f64::from(number)));
         }
         if word.starts_with(|c: char| c.is_ascii_digit()) {
-            return word.parse().map(Node::Number).map_err(|_| format!("`{word}` is not a number"));
+            return word.parse().map(Node::Number).map_err(|_| wrong("a number"));
         }
         if word == "pow10" {
-            if !self.take("(") {
-                return Err("`(` expected after `pow10`".into());
-            }
+            let after = |what, after| move |_| ExpressionError::ExpectedAfter { what, after };
+            self.demand("(", after("`(`", "`pow10`"))?;
             let inner = self.level(0)?;
-            return if self.take(")") {
-                Ok(Node::PowerOfTen(Box::new(inner)))
-            } else {
-                Err("`)` expected after `pow10(`".into())
-            };
+            self.demand(")", after("`)`", "`pow10(`"))?;
+            return Ok(Node::PowerOfTen(Box::new(inner)));
         }
-        (self.index)(word).map(Node::Signal).ok_or_else(|| format!("no signal is called `{word}`"))
+        (self.index)(word).map(Node::Signal).ok_or_else(|| ExpressionError::UnknownSignal(word.into()))
     }
 }
 
@@ -269,7 +289,7 @@ mod tests {
             ("0xZZ", "hexadecimal"),
             ("", "expected at character 1"),
         ] {
-            let error = Expression::compile(text, &none).unwrap_err();
+            let error = Expression::compile(text, &none).unwrap_err().to_string();
             assert!(error.contains(problem), "{text}: {error}");
         }
         assert!(Expression::compile(&"(".repeat(10_000), &none).is_err());

@@ -100,10 +100,23 @@ pub enum Check {
     Crc(Cyclic),
 }
 
-impl TryFrom<String> for Check {
-    type Error = String;
+/// A name that no check has.
+#[derive(Debug, Clone, PartialEq, Eq, thiserror::Error)]
+#[error(
+    "no check is called `{name}`; sum8, xor8, sum7-with-error-bit, or a CRC by its name in the catalogue, \
+     such as {alike}"
+)]
+pub struct UnknownCheck {
+    /// The name.
+    pub name: String,
+    /// CRCs of the same width, else the usual ones.
+    pub alike: String,
+}
 
-    fn try_from(name: String) -> Result<Self, String> {
+impl TryFrom<String> for Check {
+    type Error = UnknownCheck;
+
+    fn try_from(name: String) -> Result<Self, UnknownCheck> {
         let upper = |c: char| if c.is_ascii_alphanumeric() { c.to_ascii_uppercase() } else { '_' };
         let spelt: String = name.chars().map(upper).collect();
         Ok(match spelt.as_str() {
@@ -127,16 +140,10 @@ impl TryFrom<String> for Check {
                     let written = |(known, _): &(&str, Cyclic)| {
                         known.replacen('_', "-", 1).replacen('_', "/", 1).replace('_', "-")
                     };
-                    let like: Vec<String> = alike.map(written).collect();
-                    let like = if like.is_empty() {
-                        "CRC-16/MODBUS, CRC-32/ISO-HDLC".into()
-                    } else {
-                        like.join(", ")
-                    };
-                    format!(
-                        "no check is called `{name}`; sum8, xor8, sum7-with-error-bit, or a CRC by its name in the catalogue, \
-                         such as {like}"
-                    )
+                    let alike = alike.map(written).collect::<Vec<_>>().join(", ");
+                    let usual = || "CRC-16/MODBUS, CRC-32/ISO-HDLC".into();
+                    let alike = Some(alike).filter(|alike| !alike.is_empty()).unwrap_or_else(usual);
+                    UnknownCheck { name: name.clone(), alike }
                 };
                 Self::Crc(found.ok_or_else(unknown)?.1)
             }
@@ -234,7 +241,7 @@ mod tests {
         assert_eq!(named("crc-64/xz").of(b"123456789", None), 0x995D_C9BB_DF19_39FA_u64.to_le_bytes());
         assert_eq!(named("xor8").of(b"123456789", None), [0x31]);
         assert_eq!(named("sum8").of(b"123456789", None), [0xDD]);
-        let unknown = Check::try_from("CRC-16/MOBDUS".to_string()).unwrap_err();
+        let unknown = Check::try_from("CRC-16/MOBDUS".to_string()).unwrap_err().to_string();
         assert!(unknown.contains("CRC-16/MODBUS"), "{unknown}");
     }
 

@@ -50,7 +50,35 @@ pub struct DbcMessage {
     /// Signals by name.
     pub signals: HashMap<String, DbcSignal>,
     /// What is wrong with it, with the line: nobody may use it.
-    pub fault: Option<String>,
+    pub fault: Option<DbcError>,
+}
+
+/// What is wrong with a DBC file or one of its messages.
+#[derive(Debug, Clone, PartialEq, thiserror::Error)]
+#[allow(missing_docs, reason = "the message of an error says what it is")]
+pub enum DbcError {
+    #[error("no DBC file: line {line} cannot be read from column {column} on: `{shown}`")]
+    Syntax { line: usize, column: usize, shown: String },
+    #[error("no DBC file: {0}")]
+    NoDbc(#[from] can_dbc::DbcError),
+    #[error("the message {0} cannot be found again")]
+    Lost(String),
+    #[error("line {line}: the identifier {raw} of {message} has more than 29 bits")]
+    Identifier { line: usize, raw: u64, message: String },
+    #[error("line {line}: another message has the identifier of {message}")]
+    SameIdentifier { line: usize, message: String },
+    #[error("there are two messages {message}, lines {} and {}", .lines.0, .lines.1)]
+    TwoMessages { message: String, lines: (usize, usize) },
+    #[error("the message {message} has two signals {signal}, lines {} and {}", .lines.0, .lines.1)]
+    TwoSignals { message: String, signal: String, lines: (usize, usize) },
+    #[error("line {line}: signal {signal} is a float of {bits} bits")]
+    Float { line: usize, signal: String, bits: u64 },
+    #[error("line {line}: a start bit is too large")]
+    Start { line: usize },
+    #[error("line {line}: a signal is too wide")]
+    Width { line: usize },
+    #[error("line {line}: signal {signal} does not lie within message {message}")]
+    Outside { line: usize, signal: String, message: String },
 }
 
 /// The message in which editors store signals that no message has.
@@ -91,27 +119,27 @@ fn beginnings(text: &str) -> Vec<Beginning> {
 
 impl Beginning {
     /// The identifier, and whether it has 29 bits.
-    fn identifier(&self) -> Result<(u32, bool), String> {
+    fn identifier(&self) -> Result<(u32, bool), DbcError> {
         // Bit 31 marks identifiers of 29 bits. Some files leave it out where 11 bits are not enough.
         let id = self.raw & 0x7FFF_FFFF;
         let id = u32::try_from(id).ok().filter(|id| *id <= 0x1FFF_FFFF && self.raw <= u64::from(u32::MAX));
-        let id = id.ok_or_else(|| {
-            format!("line {}: the identifier {} of {} has more than 29 bits", self.line, self.raw, self.name)
-        })?;
+        let (line, raw) = (self.line, self.raw);
+        let id = id.ok_or_else(|| DbcError::Identifier { line, raw, message: self.name.clone() })?;
         Ok((id, self.raw >> 31 == 1 || id > 0x7FF))
     }
 
     /// Two signals of one name.
-    fn twice(&self) -> Option<String> {
+    fn twice(&self) -> Option<DbcError> {
         self.signals.iter().enumerate().find_map(|(k, (line, name))| {
             let (first, _) = self.signals[..k].iter().find(|(_, n)| n == name)?;
-            Some(format!("the message {} has two signals {name}, lines {first} and {line}", self.name))
+            let (message, signal) = (self.name.clone(), name.clone());
+            Some(DbcError::TwoSignals { message, signal, lines: (*first, *line) })
         })
     }
 }
 
 /// The refusal of a file that is no DBC file, with the place where reading stopped.
-fn no_dbc(text: &str, error: &can_dbc::DbcError) -> String {
+fn no_dbc(text: &str, error: can_dbc::DbcError) -> DbcError {
     let message = error.to_string();
     let place = message.split_once("--> ").and_then(|(_, rest)| {
         let (line, rest) = rest.split_once(':')?;
@@ -120,10 +148,10 @@ fn no_dbc(text: &str, error: &can_dbc::DbcError) -> String {
     });
     match place {
         Some((line, column)) => {
-            let shown = text.lines().nth(line.saturating_sub(1)).unwrap_or_default().trim();
-            format!("no DBC file: line {line} cannot be read from column {column} on: `{shown}`")
+            let shown = text.lines().nth(line.saturating_sub(1)).unwrap_or_default().trim().into();
+            DbcError::Syntax { line, column, shown }
         }
-        None => format!("no DBC file: {message}"),
+        None => error.into(),
     }
 }
 
@@ -132,20 +160,18 @@ fn no_dbc(text: &str, error: &can_dbc::DbcError) -> String {
 ///
 /// # Errors
 /// Where the file is no DBC file.
-pub fn parse(text: &str) -> Result<HashMap<String, DbcMessage>, String> {
-    let dbc = can_dbc::Dbc::try_from(text).map_err(|error| no_dbc(text, &error))?;
+pub fn parse(text: &str) -> Result<HashMap<String, DbcMessage>, DbcError> {
+    let dbc = can_dbc::Dbc::try_from(text).map_err(|error| no_dbc(text, error))?;
     let beginnings = beginnings(text);
     let mut messages = HashMap::<String, DbcMessage>::new();
     for (k, message) in dbc.messages.iter().enumerate().filter(|(_, message)| message.name != STORE) {
         let own = |b: &&Beginning| b.name == message.name;
         let begins = beginnings.get(k).filter(own).or_else(|| beginnings.iter().find(own));
-        let begins = begins.ok_or_else(|| format!("the message {} cannot be found again", message.name))?;
+        let begins = begins.ok_or_else(|| DbcError::Lost(message.name.clone()))?;
         let mut read = one(&dbc, message, begins);
         if let Some(first) = beginnings[..k.min(beginnings.len())].iter().find(own) {
-            read.fault = Some(format!(
-                "there are two messages {}, lines {} and {}",
-                message.name, first.line, begins.line
-            ));
+            let (message, lines) = (message.name.clone(), (first.line, begins.line));
+            read.fault = Some(DbcError::TwoMessages { message, lines });
         }
         let attribute = |name: &str| match dbc.message_attribute(message.id, name) {
             Some(can_dbc::AttributeValue::String(long)) if !long.is_empty() => Some(long.clone()),
@@ -171,13 +197,11 @@ fn one(dbc: &can_dbc::Dbc, message: &can_dbc::Message, begins: &Beginning) -> Db
     let apart = dbc.extended_multiplex.iter().any(|one| one.message_id == message.id)
         || dbc.signal_extended_value_type_list.iter().any(|one| one.message_id == message.id);
     if alike > 1 && apart {
-        fault = fault.or(Some(format!(
-            "line {}: another message has the identifier of {}",
-            begins.line, message.name
-        )));
+        let (line, message) = (begins.line, message.name.clone());
+        fault = fault.or(Some(DbcError::SameIdentifier { line, message }));
     }
     for signal in &message.signals {
-        match place(dbc, message, signal, length) {
+        match place(dbc, message, signal, length, line(&signal.name)) {
             Ok(place) => {
                 if let Some(can_dbc::AttributeValue::String(long)) =
                     dbc.signal_attribute(message.id, &signal.name, "SystemSignalLongSymbol")
@@ -186,7 +210,7 @@ fn one(dbc: &can_dbc::Dbc, message: &can_dbc::Message, begins: &Beginning) -> Db
                 }
                 signals.insert(signal.name.clone(), place);
             }
-            Err(why) => fault = fault.or(Some(format!("line {}: {why}", line(&signal.name)))),
+            Err(why) => fault = fault.or(Some(why)),
         }
     }
     let (id, extended) = id.unwrap_or((u32::MAX, true));
@@ -198,7 +222,9 @@ fn place(
     message: &can_dbc::Message,
     signal: &can_dbc::Signal,
     length: usize,
-) -> Result<DbcSignal, String> {
+    line: usize,
+) -> Result<DbcSignal, DbcError> {
+    let name = || signal.name.clone();
     let ranges =
         dbc.extended_multiplex.iter().any(|o| o.message_id == message.id && o.signal_name == signal.name);
     let float = match dbc.extended_value_type_for_signal(message.id, &signal.name) {
@@ -207,11 +233,11 @@ fn place(
         Some(can_dbc::SignalExtendedValueType::IEEEdouble64bit) => Some(64),
     };
     if float.is_some_and(|bits| bits != signal.size) {
-        return Err(format!("signal {} is a float of {} bits", signal.name, signal.size));
+        return Err(DbcError::Float { line, signal: name(), bits: signal.size });
     }
     let place = DbcSignal {
-        start: u16::try_from(signal.start_bit).map_err(|_| "a start bit is too large")?,
-        size: u16::try_from(signal.size).map_err(|_| "a signal is too wide")?,
+        start: u16::try_from(signal.start_bit).map_err(|_| DbcError::Start { line })?,
+        size: u16::try_from(signal.size).map_err(|_| DbcError::Width { line })?,
         little_endian: signal.byte_order == can_dbc::ByteOrder::LittleEndian,
         signed: signal.value_type == can_dbc::ValueType::Signed,
         float: float.is_some(),
@@ -228,7 +254,7 @@ fn place(
     if place.fits(length) {
         Ok(place)
     } else {
-        Err(format!("signal {} does not lie within message {}", signal.name, message.name))
+        Err(DbcError::Outside { line, signal: name(), message: message.name.clone() })
     }
 }
 
@@ -380,17 +406,17 @@ mod tests {
         let text = TEXT.replace("Fx : 0|16", "Fx : 60|16");
         let messages = parse(&text).unwrap();
         assert!(
-            messages["Short"].fault.as_ref().unwrap().contains("line 11: signal Fx"),
+            messages["Short"].fault.as_ref().unwrap().to_string().contains("line 11: signal Fx"),
             "{:?}",
             messages["Short"].fault
         );
         assert_eq!(messages["Meas"].fault, None, "the other one serves");
-        assert!(parse("hello").unwrap_err().contains("line 1"));
+        assert!(parse("hello").unwrap_err().to_string().contains("line 1"));
     }
 
     #[test]
     fn identifiers_that_do_not_fit_and_names_that_stand_twice_are_told_with_their_lines() {
-        let fault = |text: &str, name: &str| parse(text).unwrap()[name].fault.clone().unwrap_or_default();
+        let fault = |text: &str, name: &str| parse(text).unwrap()[name].fault.clone().unwrap().to_string();
         for (raw, id) in [("5000", 5000), ("2147483736", 0x58), ("2047", 0x7FF), ("536870911", 0x1FFF_FFFF)] {
             let messages = parse(&TEXT.replace("437", raw)).unwrap();
             assert_eq!((messages["Short"].id, messages["Short"].fault.clone()), (id, None), "{raw}");

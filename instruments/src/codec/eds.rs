@@ -18,6 +18,45 @@ pub struct DefaultValue {
     pub plus_node: bool,
 }
 
+/// What is wrong with a data sheet; keys of objects are index and subindex.
+#[derive(Debug, Clone, PartialEq, Eq, thiserror::Error)]
+#[allow(missing_docs, reason = "the message of an error says what it is")]
+pub enum SheetError {
+    #[error("line {line}: a section needs a `]`")]
+    Section { line: usize },
+    #[error("line {line}: `{text}` is no `key=value`")]
+    Entry { line: usize, text: String },
+    #[error("line {line}: {name} of object {:04X}sub{}: `{text}` is not a number", .object.0, .object.1)]
+    Number { line: usize, name: &'static str, object: Key, text: String },
+    #[error("object {:04X}sub{} has no DataType", .0.0, .0.1)]
+    NoType(Key),
+    #[error("object {:04X}sub{} is described twice", .0.0, .0.1)]
+    Twice(Key),
+    #[error("there is no object in it")]
+    Empty,
+    #[error(
+        "object {index:04X}sub1: the data sheet switches the frame {cob:#x} off (bit 31 of its identifier)"
+    )]
+    Off { index: u16, cob: u32 },
+    #[error(
+        "the data sheet has no process data with identifier {cob:#x} plus the node's number; it has {known}"
+    )]
+    NoFrame { cob: u32, known: String },
+    #[error("object {0:04X}sub0 has no default: nothing is mapped")]
+    Unmapped(u16),
+    #[error("object {:04X}sub{} has no default", .0.0, .0.1)]
+    NoDefault(Key),
+    #[error("object {:04X}sub{} maps {bits} bits: only whole bytes are read", .entry.0, .entry.1)]
+    PartOfByte { entry: Key, bits: usize },
+    #[error(
+        "object {:04X}sub{} maps {bits} bits of {:04X}sub{}, which has {stored:?}",
+        .entry.0, .entry.1, .object.0, .object.1
+    )]
+    OtherLength { entry: Key, bits: usize, object: Key, stored: Option<usize> },
+    #[error("object {index:04X} maps {bytes} bytes; a frame has 8")]
+    TooLong { index: u16, bytes: usize },
+}
+
 /// One object.
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub struct Object {
@@ -57,7 +96,7 @@ impl Object {
 ///
 /// # Errors
 /// What is wrong, with the line.
-pub fn parse(text: &str) -> Result<Objects, String> {
+pub fn parse(text: &str) -> Result<Objects, SheetError> {
     let mut objects = Objects::new();
     let mut section: Option<(Key, BTreeMap<String, (String, usize)>)> = None;
     for (number, line) in text.lines().enumerate().map(|(i, line)| (i + 1, line.trim())) {
@@ -65,13 +104,13 @@ pub fn parse(text: &str) -> Result<Objects, String> {
             continue;
         }
         if let Some(name) = line.strip_prefix('[') {
-            let name = name.strip_suffix(']').ok_or(format!("line {number}: a section needs a `]`"))?;
+            let name = name.strip_suffix(']').ok_or(SheetError::Section { line: number })?;
             close(&mut objects, section.take())?;
             section = key(name).map(|key| (key, BTreeMap::new()));
             continue;
         }
-        let (name, value) =
-            line.split_once('=').ok_or(format!("line {number}: `{line}` is no `key=value`"))?;
+        let no_entry = || SheetError::Entry { line: number, text: line.into() };
+        let (name, value) = line.split_once('=').ok_or_else(no_entry)?;
         if let Some((_, entries)) = &mut section {
             // A remark stands behind a blank and a semicolon.
             let value = value.find(" ;").or(value.find("\t;")).map_or(value, |at| &value[..at]);
@@ -79,7 +118,7 @@ pub fn parse(text: &str) -> Result<Objects, String> {
         }
     }
     close(&mut objects, section)?;
-    if objects.is_empty() { Err("there is no object in it".into()) } else { Ok(objects) }
+    if objects.is_empty() { Err(SheetError::Empty) } else { Ok(objects) }
 }
 
 /// The object that a section such as `6040` or `1018sub1` describes; other sections describe none.
@@ -96,27 +135,28 @@ fn key(section: &str) -> Option<Key> {
 fn close(
     objects: &mut Objects,
     section: Option<(Key, BTreeMap<String, (String, usize)>)>,
-) -> Result<(), String> {
+) -> Result<(), SheetError> {
     let Some((key, entries)) = section else { return Ok(()) };
     let (index, sub) = key;
     let entry = |name: &str| entries.get(name).map(|(value, _)| value.as_str()).filter(|v| !v.is_empty());
-    let wrong = |name: &str, text: &str| {
+    let wrong = |name: &'static str, text: &str| {
         let line = entries.get(name).map_or(0, |(_, line)| *line);
-        format!("line {line}: {name} of object {index:04X}sub{sub}: `{text}` is not a number")
+        SheetError::Number { line, name, object: key, text: text.into() }
     };
-    let whole = |name: &str| entry(name).map(|text| self::number(text).ok_or(wrong(name, text))).transpose();
+    let whole =
+        |name: &'static str| entry(name).map(|text| self::number(text).ok_or(wrong(name, text))).transpose();
     let compact = whole("compactsubobj")?.filter(|count| *count > 0);
     if compact.is_none() && matches!(whole("objecttype")?, Some(8 | 9)) {
         return Ok(());
     }
     let data_type = whole("datatype")?.and_then(|kind| u16::try_from(kind).ok());
-    let data_type = data_type.ok_or(format!("object {index:04X}sub{sub} has no DataType"))?;
+    let data_type = data_type.ok_or(SheetError::NoType(key))?;
     let access = entry("accesstype").unwrap_or("rw").to_ascii_lowercase();
     let default = entry("parametervalue").or_else(|| entry("defaultvalue")).and_then(default_of);
     let name = entry("parametername").unwrap_or_default().to_string();
     let object = Object { name, data_type, access, default };
     let mut put = |sub: u8, object: Object| match objects.insert((index, sub), object) {
-        Some(_) => Err(format!("object {index:04X}sub{sub} is described twice")),
+        Some(_) => Err(SheetError::Twice((index, sub))),
         None => Ok(()),
     };
     let Some(count) = compact else { return put(sub, object) };
@@ -155,7 +195,7 @@ fn default_of(text: &str) -> Option<DefaultValue> {
 ///
 /// # Errors
 /// Where the data sheet has no such frame that is switched on, or one that is not made of whole bytes.
-pub fn mapping(objects: &Objects, first: u16, cob: u32) -> Result<(Vec<(Key, usize)>, usize), String> {
+pub fn mapping(objects: &Objects, first: u16, cob: u32) -> Result<(Vec<(Key, usize)>, usize), SheetError> {
     let frame = |(&(index, sub), object): (&Key, &Object)| {
         let within = (first..first + 0x200).contains(&index) && sub == 1;
         object.default.filter(|_| within).map(|identifier| (index, identifier))
@@ -176,52 +216,35 @@ pub fn mapping(objects: &Objects, first: u16, cob: u32) -> Result<(Vec<(Key, usi
         frames.iter().filter(|(_, d)| of_node(d)).partition(|(_, d)| d.value & 0x8000_0000 != 0);
     let communication = match (&on[..], &off[..]) {
         ([(index, _), ..], _) => *index,
-        ([], [(index, _), ..]) => {
-            return Err(format!(
-                "object {index:04X}sub1: the data sheet switches the frame {cob:#x} off (bit 31 of its identifier)"
-            ));
-        }
+        ([], [(index, _), ..]) => return Err(SheetError::Off { index: *index, cob }),
         _ => {
-            let known: Vec<String> = frames
-                .iter()
-                .filter(|(_, d)| d.value & 0x8000_0000 == 0)
-                .map(|(_, d)| {
-                    format!(
-                        "{:#x}{}",
-                        d.value & 0x7FF,
-                        if d.plus_node { " plus the node's number" } else { "" }
-                    )
-                })
-                .collect();
-            return Err(format!(
-                "the data sheet has no process data with identifier {cob:#x} plus the node's number; it has {}",
-                if known.is_empty() { "none".into() } else { known.join(", ") }
-            ));
+            let on = frames.iter().filter(|(_, d)| d.value & 0x8000_0000 == 0);
+            let plus = |d: &DefaultValue| if d.plus_node { " plus the node's number" } else { "" };
+            let known: Vec<String> = on.map(|(_, d)| format!("{:#x}{}", d.value & 0x7FF, plus(d))).collect();
+            let known = if known.is_empty() { "none".into() } else { known.join(", ") };
+            return Err(SheetError::NoFrame { cob, known });
         }
     };
     let map = communication + 0x200;
     let value = |sub: u8| objects.get(&(map, sub)).and_then(|object| object.default).map(|d| d.value);
-    let count = value(0).ok_or(format!("object {map:04X}sub0 has no default: nothing is mapped"))?;
+    let count = value(0).ok_or(SheetError::Unmapped(map))?;
     let (mut placed, mut at) = (Vec::new(), 0);
     for sub in 1..=u8::try_from(count).unwrap_or(0) {
         // Index, subindex, length in bits (CiA 301, 7.5.2.36).
-        let entry = value(sub).ok_or(format!("object {map:04X}sub{sub} has no default"))?;
+        let entry = value(sub).ok_or(SheetError::NoDefault((map, sub)))?;
         // taken apart byte by byte
         let (key, bits) = (((entry >> 16) as u16, (entry >> 8) as u8), (entry & 0xFF) as usize);
         if bits % 8 != 0 || bits == 0 {
-            return Err(format!("object {map:04X}sub{sub} maps {bits} bits: only whole bytes are read"));
+            return Err(SheetError::PartOfByte { entry: (map, sub), bits });
         }
         let stored = objects.get(&key).and_then(Object::number).map(|number| 8 * number.bytes());
         if stored != Some(bits) {
-            let (index, sub_mapped) = key;
-            return Err(format!(
-                "object {map:04X}sub{sub} maps {bits} bits of {index:04X}sub{sub_mapped}, which has {stored:?}"
-            ));
+            return Err(SheetError::OtherLength { entry: (map, sub), bits, object: key, stored });
         }
         placed.push((key, at));
         at += bits / 8;
     }
-    if at > 8 { Err(format!("object {map:04X} maps {at} bytes; a frame has 8")) } else { Ok((placed, at)) }
+    if at > 8 { Err(SheetError::TooLong { index: map, bytes: at }) } else { Ok((placed, at)) }
 }
 
 #[cfg(test)]
@@ -245,10 +268,10 @@ mod tests {
         assert!(!objects[&(0x6064, 0)].writable() && objects[&(0x1A00, 0)].writable());
         let (placed, length) = mapping(&objects, 0x1800, 0x180).unwrap();
         assert_eq!((placed, length), (vec![((0x6041, 0), 0), ((0x6064, 0), 2)], 6));
-        assert!(mapping(&objects, 0x1800, 0x280).unwrap_err().contains("0x280"));
+        assert!(mapping(&objects, 0x1800, 0x280).unwrap_err().to_string().contains("0x280"));
         let wrong = SHEET.replace("0x60640020", "0x60640010");
         assert!(
-            mapping(&parse(&wrong).unwrap(), 0x1800, 0x180).unwrap_err().contains("16 bits"),
+            mapping(&parse(&wrong).unwrap(), 0x1800, 0x180).unwrap_err().to_string().contains("16 bits"),
             "i32 in 16 bits"
         );
     }
@@ -261,13 +284,18 @@ mod tests {
             + "[606C]\nDataType=4\nAccessType=ro\n";
         assert_eq!(map(&configured).unwrap().0[1].0, (0x606C, 0));
         let off = SHEET.replace("0x40000180", "0xC0000180");
-        assert!(map(&off).unwrap_err().contains("1800sub1") && map(&off).unwrap_err().contains("off"));
+        assert!(
+            map(&off).unwrap_err().to_string().contains("1800sub1")
+                && map(&off).unwrap_err().to_string().contains("off")
+        );
         let another = off
             + "[1801sub1]\nDataType=7\nDefaultValue=$NODEID+0x180\n[1A01sub0]\nDataType=5\nDefaultValue=1\n\
             [1A01sub1]\nDataType=7\nDefaultValue=0x60410010\n";
         assert_eq!(map(&another).unwrap(), (vec![((0x6041, 0), 0)], 2), "the one that is on");
         assert_eq!(map(&SHEET.replace("$NODEID+0x40000180", "0x185")), map(SHEET), "of node 5");
-        assert!(map(&SHEET.replace("$NODEID+0x40000180", "0x285")).unwrap_err().contains("0x285"));
+        assert!(
+            map(&SHEET.replace("$NODEID+0x40000180", "0x285")).unwrap_err().to_string().contains("0x285")
+        );
         let compact = format!(
             "{SHEET}[2000]\nObjectType=8\nDataType=6\nAccessType=rw\nDefaultValue=7\nCompactSubObj=3\n"
         );
@@ -278,10 +306,10 @@ mod tests {
 
     #[test]
     fn what_is_wrong_is_told_with_its_line() {
-        assert!(parse("[6041\n").unwrap_err().contains("line 1"));
-        assert!(parse("[6041]\nDataType=six\n").unwrap_err().contains("line 2"));
-        assert!(parse("[6041]\nAccessType=ro\n").unwrap_err().contains("DataType"));
-        assert!(parse("[6041]\nDataType=6\n[6041]\nDataType=6\n").unwrap_err().contains("twice"));
-        assert!(parse("nonsense").unwrap_err().contains("line 1"));
+        assert!(parse("[6041\n").unwrap_err().to_string().contains("line 1"));
+        assert!(parse("[6041]\nDataType=six\n").unwrap_err().to_string().contains("line 2"));
+        assert!(parse("[6041]\nAccessType=ro\n").unwrap_err().to_string().contains("DataType"));
+        assert!(parse("[6041]\nDataType=6\n[6041]\nDataType=6\n").unwrap_err().to_string().contains("twice"));
+        assert!(parse("nonsense").unwrap_err().to_string().contains("line 1"));
     }
 }

@@ -31,21 +31,20 @@ impl Form {
         }
     }
 
-    fn parse(text: &str) -> Result<Self, String> {
-        let wrong = || format!("`:{text}` is not a form: `.3`, `x`, `04X`, or words as in `OFF|ON`");
+    /// The form that `text` states, if it is one.
+    fn parse(text: &str) -> Option<Self> {
         if let Some(decimals) = text.strip_prefix('.') {
-            let decimals: u8 = decimals.parse().map_err(|_| wrong())?;
-            return if decimals <= 12 { Ok(Self::Decimal(Some(decimals))) } else { Err(wrong()) };
+            return decimals.parse().ok().filter(|decimals| *decimals <= 12).map(|n| Self::Decimal(Some(n)));
         }
         if text.contains('|') {
             let words: Vec<String> = text.split('|').map(String::from).collect();
             let repeated = words.iter().enumerate().any(|(i, word)| words[..i].contains(word));
             let empty = words.iter().any(String::is_empty);
-            return if repeated || empty { Err(wrong()) } else { Ok(Self::Words(words)) };
+            return (!repeated && !empty).then_some(Self::Words(words));
         }
-        let width = text.strip_suffix(['x', 'X']).ok_or_else(wrong)?;
-        let width = if width.is_empty() { 0 } else { width.parse().map_err(|_| wrong())? };
-        if width <= 13 { Ok(Self::Hex(width, text.ends_with('X'))) } else { Err(wrong()) }
+        let width = text.strip_suffix(['x', 'X'])?;
+        let width = if width.is_empty() { 0 } else { width.parse().ok()? };
+        (width <= 13).then_some(Self::Hex(width, text.ends_with('X')))
     }
 
     /// The number at the head of `text`, and what follows.
@@ -114,6 +113,20 @@ enum Part {
     Any,
 }
 
+/// What is wrong with a pattern.
+#[derive(Debug, Clone, PartialEq, Eq, thiserror::Error)]
+#[allow(missing_docs, reason = "the message of an error says what it is")]
+pub enum PatternError {
+    #[error("a brace without its other; `{{{{` is one brace")]
+    Brace,
+    #[error("`:{0}` is not a form: `.3`, `x`, `04X`, or words as in `OFF|ON`")]
+    Form(String),
+    #[error("between `{{*}}` and `{{{0}}}` something must stand")]
+    Neighbours(String),
+    #[error("`{{{0}}}` stands there twice")]
+    Twice(String),
+}
+
 /// A line with numbers in it.
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub struct Pattern(Vec<Part>);
@@ -123,7 +136,7 @@ impl Pattern {
     ///
     /// # Errors
     /// What is wrong with it.
-    pub fn parse(text: &str) -> Result<Self, String> {
+    pub fn parse(text: &str) -> Result<Self, PatternError> {
         let (mut parts, mut literal, mut rest) = (Vec::new(), String::new(), text);
         while let Some(at) = rest.find(['{', '}']) {
             literal.push_str(&rest[..at]);
@@ -134,9 +147,7 @@ impl Pattern {
                 rest = after;
                 continue;
             }
-            let end = rest.find('}').filter(|_| brace == "{");
-            let end =
-                end.ok_or_else(|| format!("`{text}`: a brace without its other; `{{{{` is one brace"))?;
+            let end = rest.find('}').filter(|_| brace == "{").ok_or(PatternError::Brace)?;
             let (inside, after) = (&rest[..end], &rest[end + 1..]);
             rest = after;
             if !literal.is_empty() {
@@ -148,14 +159,16 @@ impl Pattern {
                 continue;
             }
             let (name, form) = match inside.split_once(':') {
-                Some((name, form)) => (name, Form::parse(form).map_err(|why| format!("`{text}`: {why}"))?),
+                Some((name, form)) => {
+                    (name, Form::parse(form).ok_or_else(|| PatternError::Form(form.into()))?)
+                }
                 None => (inside, Form::Decimal(None)),
             };
             if open {
-                return Err(format!("`{text}`: between `{{*}}` and `{{{inside}}}` something must stand"));
+                return Err(PatternError::Neighbours(inside.into()));
             }
             if parts.iter().any(|part| matches!(part, Part::Field(known, _) if known == name)) {
-                return Err(format!("`{text}`: `{{{name}}}` stands there twice"));
+                return Err(PatternError::Twice(name.into()));
             }
             parts.push(Part::Field(name.into(), form));
         }

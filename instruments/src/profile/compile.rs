@@ -1,6 +1,7 @@
 //! From a description to a profile: names become indices, and every refusal names its place.
 
 use std::collections::HashMap;
+use std::fmt::Display;
 use std::ops::Range;
 
 use super::{
@@ -66,24 +67,24 @@ impl Compiler<'_> {
         Ok(Profile { description: d.clone(), frames, signals, sets, signatures, faults, by_name })
     }
 
-    pub(super) fn at(&self, span: Range<usize>, message: impl Into<String>) -> ProfileError {
+    pub(super) fn at(&self, span: Range<usize>, message: impl ToString) -> ProfileError {
         ProfileError::at(self.text, Some(span), message)
     }
 
     /// A refusal of what has this name.
-    pub(super) fn at_name(&self, name: &toml::Spanned<String>, message: impl Into<String>) -> ProfileError {
+    pub(super) fn at_name(&self, name: &toml::Spanned<String>, message: impl ToString) -> ProfileError {
         self.at(name.span(), message)
     }
 
     /// A file that the profile names, read by its parser; refusals stand where the profile names it.
-    fn read<T>(&self, name: &str, parse: impl Fn(&str) -> Result<T, String>) -> Result<T, ProfileError> {
+    fn read<T, E: Display>(&self, name: &str, parse: fn(&str) -> Result<T, E>) -> Result<T, ProfileError> {
         let text = (self.file)(name);
         let text = text.ok_or_else(|| self.at_text(name, format!("the file `{name}` is not there")))?;
         parse(&text).map_err(|why| self.at_text(name, format!("{name}: {why}")))
     }
 
     /// A refusal of a text of the profile, at its first place there.
-    pub(super) fn at_text(&self, text: &str, message: impl Into<String>) -> ProfileError {
+    pub(super) fn at_text(&self, text: &str, message: impl ToString) -> ProfileError {
         let place = self.text.find(text).map(|at| at..at + text.len());
         ProfileError::at(self.text, place, message)
     }
@@ -97,7 +98,7 @@ impl Compiler<'_> {
     /// The objects of the profile's data sheet, if it names one, and what the profile writes to them at connection.
     fn eds(&self) -> Result<Objects, ProfileError> {
         let Some(name) = &self.description.link.eds else { return Ok(Objects::new()) };
-        let error = |why: String| self.at_text(name, format!("{name}: {why}"));
+        let error = |why: &dyn Display| self.at_text(name, format!("{name}: {why}"));
         let sheet = self.read(name, eds::parse)?;
         for (index, sub, bytes, _) in self.description.init.iter().filter_map(|init| init.sdo) {
             let wrong = match sheet.get(&(index, sub)) {
@@ -108,17 +109,17 @@ impl Compiler<'_> {
                 }
                 Some(_) => continue,
             };
-            return Err(error(format!("object {index:04X}sub{sub} of an [[init]] {wrong}")));
+            return Err(error(&format!("object {index:04X}sub{sub} of an [[init]] {wrong}")));
         }
         let d = self.description;
         let sent =
             d.message.iter().filter_map(|m| Some((0x1800, m.cob?, usize::from(m.length.unwrap_or(8)))));
         let taken = d.write.iter().filter_map(|w| Some((0x1400, w.cob?, 2 * usize::from(w.count))));
         for (first, cob, length) in sent.chain(taken) {
-            let (_, mapped) = eds::mapping(&sheet, first, cob).map_err(error)?;
+            let (_, mapped) = eds::mapping(&sheet, first, cob).map_err(|why| error(&why))?;
             if mapped != length {
                 let why = format!("the frame {cob:#x} has {mapped} bytes, the profile says {length}");
-                return Err(error(why));
+                return Err(error(&why));
             }
         }
         Ok(sheet)
@@ -133,14 +134,13 @@ impl Compiler<'_> {
         sheet: &Objects,
         name: &toml::Spanned<String>,
     ) -> Result<Field, ProfileError> {
-        let error = |why: String| self.at_name(name, format!("`{}`: {why}", name.as_ref()));
-        let (object, cob) =
-            object.zip(cob).ok_or_else(|| error("`object` needs a frame with `cob`".into()))?;
-        let (placed, _) = eds::mapping(sheet, first, cob).map_err(error)?;
+        let error = |why: &dyn Display| self.at_name(name, format!("`{}`: {why}", name.as_ref()));
+        let (object, cob) = object.zip(cob).ok_or_else(|| error(&"`object` needs a frame with `cob`"))?;
+        let (placed, _) = eds::mapping(sheet, first, cob).map_err(|why| error(&why))?;
         let at = placed.iter().find(|(key, _)| *key == object).map(|(_, at)| *at);
-        let at = at.ok_or_else(|| error(format!("{:04X}sub{} is not mapped there", object.0, object.1)))?;
+        let at = at.ok_or_else(|| error(&format!("{:04X}sub{} is not mapped there", object.0, object.1)))?;
         let number = sheet.get(&object).and_then(eds::Object::number);
-        let number = number.ok_or_else(|| error("the object is not a number of at most 32 bits".into()))?;
+        let number = number.ok_or_else(|| error(&"the object is not a number of at most 32 bits"))?;
         // CANopen is little endian throughout.
         Ok(Field { at, number, order: ByteOrder::Dcba, bits: None })
     }
@@ -505,7 +505,7 @@ impl Compiler<'_> {
 
     /// A pattern of the file, its place the text itself.
     pub(super) fn pattern(&self, text: &str) -> Result<Pattern, ProfileError> {
-        Pattern::parse(text).map_err(|why| self.at_text(text, why))
+        Pattern::parse(text).map_err(|why| self.at_text(text, format!("`{text}`: {why}")))
     }
 
     /// The line that carries a set-point, and whose values stand in it.

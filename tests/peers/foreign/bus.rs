@@ -44,7 +44,7 @@ fn buses_are_described_as_cantools_and_python_canopen_read_them() {
             let mapped = eds::mapping(&objects, 0x1800, 0x180);
             let cob = one["cob"].as_u64().unwrap();
             if cob & 0x8000_0000 != 0 {
-                assert!(mapped.unwrap_err().contains("off"), "{path}");
+                assert!(mapped.unwrap_err().to_string().contains("off"), "{path}");
                 continue;
             }
             assert_eq!(cob & 0x7FF, 0x185, "{one}");
