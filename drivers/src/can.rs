@@ -4,8 +4,8 @@
 //! an earlier one left. After a time without an answer the driver only listens before the next request, so
 //! that a late half is never joined to a new one.
 
-use super::off::Closed;
-use super::session::{Ended, LONGEST_SLEEP, Periodic, Session};
+use super::ended::{Closed, Ended};
+use super::session::{LONGEST_SLEEP, Periodic, Session};
 use super::setup::InstrumentSetup;
 use super::slcan::Slcan;
 use super::socketcan::KernelCan;
@@ -40,7 +40,7 @@ pub fn open(address: &str, bitrate: u32) -> Result<Box<dyn CanPort>, Ended> {
 ///
 /// # Errors
 /// Where no thread can be had.
-pub fn spawn(instrument: &InstrumentSetup, session: Session) -> Result<JoinHandle<Closed>, String> {
+pub fn spawn(instrument: &InstrumentSetup, session: Session) -> Result<JoinHandle<Closed>, Ended> {
     let link = session.endpoint.profile().description.link.clone();
     let address = instrument.address.clone();
     let base = instrument.base.or(link.base).unwrap_or(0);

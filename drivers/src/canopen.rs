@@ -5,9 +5,10 @@
 //! the rig, never by itself.
 
 use super::can::{self, PASSIVE, WARNS};
+use super::ended::{Closed, Ended};
 use super::endpoint::{BadFrame, Due};
-use super::off::{self, Closed, OFF_ANSWER_MS, OffWay};
-use super::session::{Ended, LONGEST_SLEEP, Periodic, Session};
+use super::off::{self, OFF_ANSWER_MS, OffWay};
+use super::session::{LONGEST_SLEEP, Periodic, Session};
 use super::setup::InstrumentSetup;
 use instruments::bus::{CanEvent, CanPort};
 use instruments::codec::can::CanFrame;
@@ -27,7 +28,7 @@ const NOT_ENABLED: u16 = 0x07;
 ///
 /// # Errors
 /// Where no thread can be had.
-pub fn spawn(instrument: &InstrumentSetup, session: Session) -> Result<JoinHandle<Closed>, String> {
+pub fn spawn(instrument: &InstrumentSetup, session: Session) -> Result<JoinHandle<Closed>, Ended> {
     let link = session.endpoint.profile().description.link.clone();
     let address = instrument.address.clone();
     let node = instrument.base.and_then(|base| u8::try_from(base).ok()).or(link.node).unwrap_or(1);

@@ -4,9 +4,10 @@
 //! anything off. A thread reads it a few times a second over Modbus TCP, passes set-points on, and connects
 //! again after an outage.
 
-use super::InstrumentSetup;
+use super::endpoint::BadFrame;
 use super::modbus::{Blocks, Registers, Trouble};
 use super::modbus_tcp::{Tcp, resolve};
+use super::{Ended, InstrumentSetup, OpenError};
 use instruments::profile::FrameKind;
 use instruments::schema::{LinkKind, Role};
 use instruments::{FrameId, Profile};
@@ -50,17 +51,17 @@ pub struct Chamber {
 /// Whether a profile is that of a chamber or a gauge which this driver can talk to.
 ///
 /// # Errors
-/// Why not, in words.
-pub fn serves(profile: &Profile) -> Result<(), String> {
-    let id = profile.id();
+/// Why not.
+pub fn serves(profile: &Profile) -> Result<(), OpenError> {
+    let id = profile.id().to_string();
     if !profile.description.profile.roles.contains(&Role::AmbientChamber) {
-        return Err(format!("profile `{id}` is not a chamber's: its roles lack `ambient.chamber`"));
+        return Err(OpenError::NoChamber(id));
     }
     if profile.description.link.kind != LinkKind::ModbusTcp {
-        return Err(format!("profile `{id}`: a chamber is read over Modbus TCP (`kind = \"modbus_tcp\"`)"));
+        return Err(OpenError::ChamberLink(id));
     }
     if QUANTITIES.iter().all(|name| profile.signal(name).is_none()) {
-        return Err(format!("profile `{id}` has no signal `pressure`, `temperature` or `humidity`"));
+        return Err(OpenError::NoAir(id));
     }
     Ok(())
 }
@@ -70,13 +71,14 @@ impl Chamber {
     ///
     /// # Errors
     /// A profile that is not a chamber's, an address that makes no sense, no answer.
-    pub fn open(setup: &InstrumentSetup) -> Result<Self, String> {
-        let profile = setup.description().map_err(|error| error.to_string())?;
+    pub fn open(setup: &InstrumentSetup) -> Result<Self, OpenError> {
+        let profile = setup.description()?;
         serves(&profile)?;
-        let at = |problem: String| format!("`{}` at {}: {problem}", setup.profile, setup.address);
+        let (id, address) = (&setup.profile, &setup.address);
+        let at = |problem| OpenError::Beside { id: id.clone(), address: address.clone(), problem };
         let link = &profile.description.link;
         let mut talk = Talk {
-            address: resolve(&setup.address, link.port).map_err(at)?,
+            address: resolve(address, link.port).map_err(|error| at(error.into()))?,
             unit: setup.unit.or(link.unit).unwrap_or(255),
             connect_ms: link.connect_timeout_ms,
             answer_ms: link.response_timeout_ms,
@@ -85,7 +87,7 @@ impl Chamber {
             taken: [None; 3],
         };
         let runtime = tokio::runtime::Builder::new_current_thread().enable_all().build();
-        let runtime = runtime.map_err(|error| at(error.to_string()))?;
+        let runtime = runtime.map_err(|error| at(error.into()))?;
         let shared = Arc::new(Mutex::new(Shared::default()));
         // An outage of the air's line only ages its readings: the time that its answers may take is never held.
         let clock = Clock::from(Instant::now());
@@ -98,7 +100,7 @@ impl Chamber {
         let (theirs, ends) = (Arc::clone(&shared), Arc::clone(&stop));
         let work = move || talk.go_on((&runtime, &clock), &theirs, &ends);
         let thread = std::thread::Builder::new().name("chamber".into()).spawn(work);
-        Ok(Self { shared, stop, thread: Some(thread.map_err(|error| at(error.to_string()))?) })
+        Ok(Self { shared, stop, thread: Some(thread.map_err(|error| at(error.into()))?) })
     }
 
     /// What was read last.
@@ -137,9 +139,8 @@ struct Talk {
 }
 
 impl Talk {
-    fn connect<'a>(&self, runtime: (&'a Runtime, &'a Clock)) -> Result<Tcp<'a>, String> {
+    fn connect<'a>(&self, runtime: (&'a Runtime, &'a Clock)) -> Result<Tcp<'a>, Ended> {
         Tcp::connect(runtime, self.address, self.unit, self.connect_ms, self.answer_ms)
-            .map_err(|e| e.to_string())
     }
 
     fn go_on(&mut self, runtime: (&Runtime, &Clock), shared: &Mutex<Shared>, ends: &AtomicBool) {
@@ -153,9 +154,9 @@ impl Talk {
             let wait = if looked.is_ok() { EVERY } else { AGAIN };
             match looked {
                 Ok(air) => lock(shared).air = air,
-                Err(problem) => {
+                Err(ended) => {
                     // A reading that nobody renews grows old where it is; the run sees its age.
-                    lock(shared).air.problem = Some(problem);
+                    lock(shared).air.problem = Some(ended.to_string());
                     (wire, self.taken) = (None, [None; 3]);
                 }
             }
@@ -164,7 +165,7 @@ impl Talk {
     }
 
     /// Writes the set-points that are new, and reads everything.
-    fn look(&mut self, wire: &mut Tcp<'_>, set: &[Option<f64>; 3]) -> Result<Air, String> {
+    fn look(&mut self, wire: &mut Tcp<'_>, set: &[Option<f64>; 3]) -> Result<Air, Ended> {
         let mut problem = None;
         for (index, value) in set.iter().enumerate() {
             let (Some(value), Some(id)) = (value, self.profile.set(QUANTITIES[index])) else { continue };
@@ -186,7 +187,7 @@ impl Talk {
                     Err(Trouble::Refused(why) | Trouble::Corrupt(why)) => {
                         problem = Some(format!("{} {value} was refused: {why}", QUANTITIES[index]));
                     }
-                    Err(Trouble::Ended(ended)) => return Err(ended.to_string()),
+                    Err(Trouble::Ended(ended)) => return Err(ended),
                 }
             }
         }
@@ -194,7 +195,7 @@ impl Talk {
         Ok(Air { readings, problem })
     }
 
-    fn read(&self, wire: &mut Tcp<'_>) -> Result<[Option<(f64, Instant)>; 3], String> {
+    fn read(&self, wire: &mut Tcp<'_>) -> Result<[Option<(f64, Instant)>; 3], Ended> {
         let mut values = self.profile.values();
         for (index, frame) in self.profile.frames().iter().enumerate() {
             let FrameKind::Poll(poll) = frame.kind else { continue };
@@ -202,12 +203,14 @@ impl Talk {
             let mut bytes = Vec::new();
             for span in &frame.spans {
                 let part = wire.read(table, span.address, span.count);
-                bytes.extend(part.map_err(|trouble| format!("{trouble:?}"))?);
+                bytes.extend(part.map_err(|trouble| Ended::Io(format!("{trouble:?}")))?);
             }
-            self.profile.decode(FrameId(index), &bytes, &mut values).map_err(|error| error.to_string())?;
+            let decoded = self.profile.decode(FrameId(index), &bytes, &mut values);
+            decoded.map_err(|error| BadFrame::Corrupt(error.to_string()))?;
         }
         if let Some(broken) = self.profile.broken_signature(&values) {
-            return Err(self.profile.description.signature[broken].text.clone());
+            let text = self.profile.description.signature[broken].text.clone();
+            return Err(BadFrame::WrongInstrument(text).into());
         }
         let now = Instant::now();
         Ok(QUANTITIES.map(|name| {

@@ -11,7 +11,7 @@ use super::ports::{
     self, AmplifierPort, ContactsPort, DriveSetPoint, ForcePort, Link, StagePort, StageSetPoint, SupplyPort,
     SupplySetPoint,
 };
-use super::setup::{AxisSetup, InstrumentSetup};
+use super::setup::{AxisSetup, CONTACTS, InstrumentSetup, SetupError};
 use super::timebase::{Counter, DeviceClock, Step};
 use instruments::schema::{Severity, Stamp};
 use instruments::{FrameId, Profile, SetId, SignalId, Values};
@@ -90,25 +90,19 @@ struct ContactsLink {
     ring: HeapProd<Contacts>,
 }
 
-/// Names of the safety contacts' signals.
-const CONTACTS: [&str; 3] = ["emergency_stop", "interlock", "dead_man"];
-
 impl ContactsLink {
     /// The contacts that a profile has and that are wired, and their port.
-    fn of(profile: &Profile, setup: &InstrumentSetup) -> Result<(Self, ContactsPort), String> {
+    fn of(profile: &Profile, setup: &InstrumentSetup) -> Result<(Self, ContactsPort), SetupError> {
         if let Some(wired) = &setup.wired
             && let Some(unknown) = wired
                 .iter()
                 .find(|name| !CONTACTS.contains(&name.as_str()) || profile.signal(name.as_str()).is_none())
         {
-            return Err(format!(
-                "`wired`: the profile has no contact `{unknown}`; contacts: {}",
-                CONTACTS.join(", ")
-            ));
+            return Err(SetupError::NoContact(unknown.clone()));
         }
         let signals = CONTACTS.map(|name| profile.signal(name).filter(|_| setup.is_wired(name)));
         if signals.iter().all(Option::is_none) {
-            return Err(format!("none of the contacts {} is there and wired", CONTACTS.join(", ")));
+            return Err(SetupError::NoContacts);
         }
         let (ring, port) = ports::sensor(Contacts::missing(NoData::NeverRead));
         Ok((Self { signals, last: Contacts::missing(NoData::NotFitted), ring }, port))
@@ -179,14 +173,12 @@ impl Endpoint {
     pub fn force(
         profile: Profile,
         setup: &InstrumentSetup,
-    ) -> Result<(Self, (ForcePort, (bool, bool))), String> {
-        let axis = |wanted: &Option<AxisSetup>, name: &str| match wanted {
+    ) -> Result<(Self, (ForcePort, (bool, bool))), SetupError> {
+        let axis = |wanted: &Option<AxisSetup>, name: &'static str| match wanted {
             Some(axis) => {
                 let signal = need(&profile, &axis.signal)?;
                 if !(axis.gain.is_finite() && axis.gain != 0.0 && axis.offset_n.is_finite()) {
-                    return Err(format!(
-                        "the gain of axis `{name}` must not be zero, and both numbers must be finite"
-                    ));
+                    return Err(SetupError::Gain(name));
                 }
                 Ok(Some(Axis { signal, gain: axis.gain, offset_n: axis.offset_n }))
             }
@@ -195,11 +187,7 @@ impl Endpoint {
         };
         let (lateral, normal) = (axis(&setup.lateral, "lateral")?, axis(&setup.normal, "normal")?);
         if lateral.is_none() && normal.is_none() {
-            let signals: Vec<&str> = profile.signals().map(|(name, _)| name).collect();
-            return Err(format!(
-                "say which signal is `lateral` or `normal`; the profile has {}",
-                signals.join(", ")
-            ));
+            return Err(SetupError::NoAxis { known: signals(&profile) });
         }
         let axes = (lateral.is_some(), normal.is_some());
         let (ring, port) = ports::sensor(Forces::missing(NoData::NeverRead));
@@ -211,19 +199,21 @@ impl Endpoint {
     ///
     /// # Errors
     /// Where the profile lacks a signal or set-point that an amplifier must have.
-    pub fn amplifier(mut profile: Profile, setup: &InstrumentSetup) -> Result<(Self, AmplifierPort), String> {
+    pub fn amplifier(
+        mut profile: Profile,
+        setup: &InstrumentSetup,
+    ) -> Result<(Self, AmplifierPort), SetupError> {
+        let positive = |gain: f64, key| match gain.is_finite() && gain > 0.0 {
+            true => Ok(gain),
+            false => Err(SetupError::NotPositive(key)),
+        };
         if let Some(gain) = setup.amplitude_m_per_unit {
-            if !(gain.is_finite() && gain > 0.0) {
-                return Err("`amplitude_m_per_unit` must be above zero".into());
-            }
+            positive(gain, "amplitude_m_per_unit")?;
             profile.set_si("amplitude", gain);
             profile.set_si("echo_amplitude", gain);
         }
         if let Some(gain) = setup.measured_m_per_unit {
-            if !(gain.is_finite() && gain > 0.0) {
-                return Err("`measured_m_per_unit` must be above zero".into());
-            }
-            profile.set_measured_si("amplitude", gain);
+            profile.set_measured_si("amplitude", positive(gain, "measured_m_per_unit")?);
         }
         let signals = AmplifierSignals {
             echo_amplitude: need(&profile, "echo_amplitude")?,
@@ -245,7 +235,7 @@ impl Endpoint {
     ///
     /// # Errors
     /// Where the profile lacks a signal or set-point that a stage must have.
-    pub fn stage(profile: Profile, setup: &InstrumentSetup) -> Result<(Self, StagePort), String> {
+    pub fn stage(profile: Profile, setup: &InstrumentSetup) -> Result<(Self, StagePort), SetupError> {
         let signals = StageSignals {
             position: need(&profile, "position")?,
             velocity: need(&profile, "velocity")?,
@@ -255,7 +245,7 @@ impl Endpoint {
         need_set(&profile, "velocity")?;
         let dead_weight_n = setup.dead_weight_n;
         if profile.set("load").is_none() && dead_weight_n.is_none() {
-            return Err("the instrument loads nothing: say the weight that does, as `dead_weight_n`".into());
+            return Err(SetupError::NoLoad);
         }
         let (link, port) = ports::port();
         Ok((Self::new(profile, Part::Stage { signals, link, dead_weight_n }), port))
@@ -265,15 +255,13 @@ impl Endpoint {
     ///
     /// # Errors
     /// Where the profile lacks the signal that reads the switch back, the set-point, or its safe value.
-    pub fn supply(profile: Profile) -> Result<(Self, SupplyPort), String> {
+    pub fn supply(profile: Profile) -> Result<(Self, SupplyPort), SetupError> {
         let closed = need(&profile, "closed")?;
         need_set(&profile, "closed")?;
         let (link, port) = ports::port();
         let endpoint = Self::new(profile, Part::Supply { closed, link });
         if endpoint.safe_set_points().is_empty() {
-            return Err(
-                "its set-point `closed` has no `safe` value: it could not be opened at the end".into()
-            );
+            return Err(SetupError::NoSafeValue);
         }
         Ok((endpoint, port))
     }
@@ -282,7 +270,7 @@ impl Endpoint {
     ///
     /// # Errors
     /// Where the profile has none of their signals.
-    pub fn contacts(profile: Profile, setup: &InstrumentSetup) -> Result<(Self, ContactsPort), String> {
+    pub fn contacts(profile: Profile, setup: &InstrumentSetup) -> Result<(Self, ContactsPort), SetupError> {
         let (link, port) = ContactsLink::of(&profile, setup)?;
         Ok((Self::new(profile, Part::Contacts(link)), port))
     }
@@ -480,15 +468,17 @@ impl Endpoint {
     }
 }
 
-fn need(profile: &Profile, name: &str) -> Result<SignalId, String> {
-    profile.signal(name).ok_or_else(|| {
-        let known: Vec<&str> = profile.signals().map(|(name, _)| name).collect();
-        format!("the profile has no signal `{name}`; it has {}", known.join(", "))
-    })
+fn need(profile: &Profile, name: &str) -> Result<SignalId, SetupError> {
+    let missing = || SetupError::NoSignal { name: name.into(), known: signals(profile) };
+    profile.signal(name).ok_or_else(missing)
 }
 
-fn need_set(profile: &Profile, name: &str) -> Result<SetId, String> {
-    profile.set(name).ok_or_else(|| format!("the profile has no set-point `{name}`"))
+fn signals(profile: &Profile) -> String {
+    profile.signals().map(|(name, _)| name).collect::<Vec<_>>().join(", ")
+}
+
+fn need_set(profile: &Profile, name: &'static str) -> Result<SetId, SetupError> {
+    profile.set(name).ok_or(SetupError::NoSetPoint(name))
 }
 
 #[cfg(test)]

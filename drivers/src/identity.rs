@@ -1,8 +1,8 @@
 //! Which instrument a setup means, however its address is spelt: what one controller claims and another must find claimed.
 
+use super::OpenError;
 use super::modbus_tcp::resolve;
 use super::setup::{InstrumentSetup, InstrumentsSetup};
-use super::{OpenError, mismatch};
 use instruments::schema::LinkKind;
 use std::collections::BTreeSet;
 use std::net::{IpAddr, Ipv4Addr, SocketAddr, UdpSocket};
@@ -51,7 +51,7 @@ fn place(instrument: &InstrumentSetup) -> Result<Option<String>, OpenError> {
         (path != "pty").then(|| format!("line{}", canonical.display()))
     };
     let socket = |address: &str| {
-        let found = resolve(address, link.port).map_err(|problem| mismatch(instrument, problem))?;
+        let found = resolve(address, link.port).map_err(|problem| instrument.mismatch(problem))?;
         Ok((found.port() != 0).then(|| spelt_one_way(found)))
     };
     Ok(match link.kind {

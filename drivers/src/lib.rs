@@ -45,6 +45,7 @@
 //! | [`bundled`] | the profiles that come with the program |
 //! | [`library`] | profiles from files and folders |
 //! | [`mailbox`] | the newest command on its way from the loop to a link |
+//! | [`ended`] | why a conversation ended, and how its link was closed |
 //! | [`session`] | the life of a link: connect, converse, back off |
 //! | [`off`] | how an instrument is switched off and read back, whatever the wire |
 //! | [`modbus`] | the conversation with registers, over [`modbus_tcp`] or [`modbus_rtu`] |
@@ -66,6 +67,7 @@ pub mod bundled;
 pub mod can;
 pub mod canopen;
 pub mod chamber;
+pub mod ended;
 pub mod endpoint;
 pub mod health;
 pub mod identity;
@@ -94,9 +96,9 @@ pub mod trace;
 pub mod transport;
 pub mod vibrometer;
 
+pub use ended::{Closed, Ended};
 pub use health::{Health, HealthReport};
-pub use off::Closed;
-pub use setup::{AxisSetup, InstrumentSetup, InstrumentsSetup};
+pub use setup::{AxisSetup, InstrumentSetup, InstrumentsSetup, SetupError};
 
 use endpoint::Endpoint;
 use instruments::Profile;
@@ -135,7 +137,7 @@ pub enum OpenError {
     UnknownProfile { id: String, known: String, looked: String },
     /// A profile, or a file that it names, cannot be read.
     #[error("{}: {problem}", file.display())]
-    Unreadable { file: std::path::PathBuf, problem: String },
+    Unreadable { file: std::path::PathBuf, problem: library::FileError },
     /// One name stands for two profiles.
     #[error("two profiles are called `{id}`: {places}; {remedy}")]
     Ambiguous { id: String, places: String, remedy: String },
@@ -144,10 +146,25 @@ pub enum OpenError {
     Profile { id: String, error: instruments::ProfileError },
     /// The setup and the profile do not fit.
     #[error("instrument `{id}` at {address}: {problem}")]
-    Mismatch { id: String, address: String, problem: String },
+    Mismatch { id: String, address: String, problem: SetupError },
     /// The instrument did not answer, or is not what the profile says.
     #[error("instrument `{id}` at {address}: {problem}")]
-    Link { id: String, address: String, problem: String },
+    Link { id: String, address: String, problem: Ended },
+    /// The same of an instrument beside the loop.
+    #[error("`{id}` at {address}: {problem}")]
+    Beside { id: String, address: String, problem: Ended },
+    /// The profile is not that of a chamber or a gauge.
+    #[error("profile `{0}` is not a chamber's: its roles lack `ambient.chamber`")]
+    NoChamber(String),
+    /// The chamber has a wire that is not supported.
+    #[error("profile `{0}`: a chamber is read over Modbus TCP (`kind = \"modbus_tcp\"`)")]
+    ChamberLink(String),
+    /// The chamber reads none of [`chamber::QUANTITIES`].
+    #[error("profile `{0}` has no signal `pressure`, `temperature` or `humidity`")]
+    NoAir(String),
+    /// The profile is another instrument's.
+    #[error("profile `{0}` is not that of a vibrometer's controller")]
+    NoVibrometer(String),
 }
 
 /// What an instrument is to the rig.
@@ -247,50 +264,26 @@ impl Drop for Links {
 /// The first instrument that is unknown, does not fit the setup, does not answer, or is another
 /// than the profile says. Nothing was commanded then.
 pub fn open(setup: &InstrumentsSetup, clock: impl Into<Clock>) -> Result<Rig, OpenError> {
-    let clock = &clock.into();
-    clock.hold_for(setup.all().map(|instrument| instrument.address.as_str()));
-    let mut links = Links::none(clock.clone());
+    let mut links = Links::none(clock.into());
+    links.clock.hold_for(setup.all().map(|instrument| instrument.address.as_str()));
     let mut force = Vec::new();
-    for instrument in &setup.force {
-        let (endpoint, port) = Endpoint::force(instrument.description()?, instrument)
-            .map_err(|problem| mismatch(instrument, problem))?;
-        start(&mut links, instrument, endpoint, clock)?;
-        force.push(port);
+    for own in &setup.force {
+        force.push(start(&mut links, own, Endpoint::force(own.description()?, own))?);
     }
-    let force = ports::compose(force).map_err(|problem| mismatch(&setup.force[0], problem))?;
-
-    let (endpoint, amplifier) = Endpoint::amplifier(setup.amplifier.description()?, &setup.amplifier)
-        .map_err(|problem| mismatch(&setup.amplifier, problem))?;
-    start(&mut links, &setup.amplifier, endpoint, clock)?;
-
-    let (endpoint, stage) = Endpoint::stage(setup.stage.description()?, &setup.stage)
-        .map_err(|problem| mismatch(&setup.stage, problem))?;
-    start(&mut links, &setup.stage, endpoint, clock)?;
-    let (supply, contacts) = open_safety(setup, &mut links, clock)?;
-    Ok(Rig { force, amplifier: Box::new(amplifier), stage: Box::new(stage), supply, contacts, links })
-}
-
-/// The second switch-off channel and the safety contacts.
-fn open_safety(
-    setup: &InstrumentsSetup,
-    links: &mut Links,
-    clock: &Clock,
-) -> Result<(Box<dyn SupplySwitch>, Box<dyn SafetyInputs>), OpenError> {
+    let force = ports::compose(force).map_err(|problem| setup.force[0].mismatch(problem))?;
+    let own = &setup.amplifier;
+    let amplifier = start(&mut links, own, Endpoint::amplifier(own.description()?, own))?;
+    let own = &setup.stage;
+    let stage = start(&mut links, own, Endpoint::stage(own.description()?, own))?;
     let mut supply: Box<dyn SupplySwitch> = Box::new(Absent);
+    if let Some(own) = &setup.supply_relay {
+        supply = Box::new(start(&mut links, own, Endpoint::supply(own.description()?))?);
+    }
     let mut contacts: Box<dyn SafetyInputs> = Box::new(Absent);
-    if let Some(instrument) = &setup.supply_relay {
-        let (endpoint, port) =
-            Endpoint::supply(instrument.description()?).map_err(|problem| mismatch(instrument, problem))?;
-        start(links, instrument, endpoint, clock)?;
-        supply = Box::new(port);
+    if let Some(own) = &setup.safety_inputs {
+        contacts = Box::new(start(&mut links, own, Endpoint::contacts(own.description()?, own))?);
     }
-    if let Some(instrument) = &setup.safety_inputs {
-        let (endpoint, port) = Endpoint::contacts(instrument.description()?, instrument)
-            .map_err(|problem| mismatch(instrument, problem))?;
-        start(links, instrument, endpoint, clock)?;
-        contacts = Box::new(port);
-    }
-    Ok((supply, contacts))
+    Ok(Rig { force, amplifier: Box::new(amplifier), stage: Box::new(stage), supply, contacts, links })
 }
 
 /// The bundled profile of that name, its golden vectors run.
@@ -308,10 +301,6 @@ pub fn profile(id: &str) -> Result<Profile, OpenError> {
         .map_err(|error| OpenError::Profile { id: id.into(), error })
 }
 
-fn mismatch(instrument: &InstrumentSetup, problem: String) -> OpenError {
-    OpenError::Mismatch { id: instrument.profile.clone(), address: instrument.address.clone(), problem }
-}
-
 /// Connects one instrument by itself: its port is the endpoint's other half.
 ///
 /// # Errors
@@ -322,26 +311,22 @@ pub fn open_one(
     clock: impl Into<Clock>,
 ) -> Result<Links, OpenError> {
     let mut links = Links::none(clock.into());
-    let clock = &links.clock.clone();
-    start(&mut links, instrument, endpoint, clock)?;
+    start(&mut links, instrument, Ok((endpoint, ())))?;
     Ok(links)
 }
 
-/// Starts the thread of one instrument and waits for its first sample.
-fn start(
+/// Starts the thread of one instrument, waits for its first sample and returns its port.
+fn start<Port>(
     links: &mut Links,
     instrument: &InstrumentSetup,
-    endpoint: Endpoint,
-    clock: &Clock,
-) -> Result<(), OpenError> {
+    made: Result<(Endpoint, Port), SetupError>,
+) -> Result<Port, OpenError> {
+    let (endpoint, port) = made.map_err(|problem| instrument.mismatch(problem))?;
     let (health, role) = (endpoint.health(), endpoint.role());
     let (ready, opened) = std::sync::mpsc::sync_channel(1);
-    let session = Session::new(endpoint, clock.clone(), Arc::clone(&links.stop), ready);
-    let failed = |problem: String| OpenError::Link {
-        id: instrument.profile.clone(),
-        address: instrument.address.clone(),
-        problem,
-    };
+    let session = Session::new(endpoint, links.clock.clone(), Arc::clone(&links.stop), ready);
+    let (id, address) = (&instrument.profile, &instrument.address);
+    let failed = |problem| OpenError::Link { id: id.clone(), address: address.clone(), problem };
     let thread = match session.endpoint.profile().description.link.kind {
         // Registers are registers: `rtu:PATH` reaches the same map over a serial line.
         LinkKind::ModbusTcp if !instrument.address.starts_with("rtu:") => {
@@ -349,7 +334,7 @@ fn start(
         }
         LinkKind::ModbusTcp | LinkKind::ModbusRtu => modbus_rtu::spawn(instrument, session),
         LinkKind::Can if !session.endpoint.role().only_measures() => {
-            Err("set-points do not go by plain CAN messages; only sensors can be reached so".into())
+            return Err(instrument.mismatch(SetupError::PlainCan));
         }
         LinkKind::Can => can::spawn(instrument, session),
         LinkKind::Canopen => canopen::spawn(instrument, session),
@@ -359,11 +344,8 @@ fn start(
     }
     .map_err(failed)?;
     links.links.push(Link { name: instrument.profile.clone(), role, health, thread: Some(thread) });
-    match opened.recv() {
-        Ok(Ok(())) => Ok(()),
-        Ok(Err(problem)) => Err(failed(problem)),
-        Err(_) => Err(failed("its thread ended before the first sample".into())),
-    }
+    opened.recv().unwrap_or(Err(Ended::Unopened)).map_err(failed)?;
+    Ok(port)
 }
 
 /// Samples per second of a profile's regular samples: of its stream, its polls, its

@@ -5,12 +5,31 @@
 
 use super::{OpenError, bundled};
 use instruments::Profile;
+use instruments::codec::encoding::{NotText, decoded};
 use std::io::Read;
 use std::path::{Path, PathBuf};
 use std::sync::Arc;
 
 /// The largest file that a profile may be, or name.
 const MAX_BYTES: u64 = 1 << 20;
+
+/// Why a file of a profile is refused.
+#[derive(Debug, thiserror::Error)]
+#[allow(missing_docs, reason = "the message of an error says what it is")]
+pub enum FileError {
+    #[error(transparent)]
+    Io(#[from] std::io::Error),
+    #[error("it is not an ordinary file")]
+    NotOrdinary,
+    #[error("it has more than {MAX_BYTES} bytes")]
+    TooLong,
+    #[error("it is not UTF-8: {0}")]
+    NotUtf8(#[from] std::string::FromUtf8Error),
+    #[error(transparent)]
+    NotText(#[from] NotText),
+    #[error("its profile is called `{0}`: file and `id` must bear one name")]
+    OtherName(String),
+}
 
 /// A profile as it was read: its text and the files that it names.
 #[derive(Debug, Clone, PartialEq, Eq)]
@@ -31,8 +50,8 @@ impl Source {
     /// # Errors
     /// A file that cannot be read, or a profile that does not hold, with the place.
     pub fn read(origin: &Path) -> Result<Self, OpenError> {
-        let unreadable = |problem: String| OpenError::Unreadable { file: origin.into(), problem };
-        let text = text_of(origin).map_err(unreadable)?;
+        let unreadable = |file: &Path, problem| OpenError::Unreadable { file: file.into(), problem };
+        let text = text_of(origin).map_err(|problem| unreadable(origin, problem))?;
         let named = |error| OpenError::Profile { id: origin.display().to_string(), error };
         let files = Profile::names_files(&text).map_err(named)?;
         let folder = origin.parent().unwrap_or(Path::new("."));
@@ -41,9 +60,7 @@ impl Source {
             let path = folder.join(&name);
             let found = match bundled::file(&name) {
                 Some(text) if !path.exists() => text.to_string(),
-                _ => {
-                    foreign_text_of(&path).map_err(|problem| OpenError::Unreadable { file: path, problem })?
-                }
+                _ => foreign_text_of(&path).map_err(|problem| unreadable(&path, problem))?,
             };
             read.push((name, found));
         }
@@ -99,13 +116,7 @@ impl Library {
         for file in files.filter(|file| file.exists()) {
             let source = Source::read(&file)?;
             if source.id != name {
-                return Err(OpenError::Unreadable {
-                    file,
-                    problem: format!(
-                        "its profile is called `{}`: file and `id` must bear one name",
-                        source.id
-                    ),
-                });
+                return Err(OpenError::Unreadable { file, problem: FileError::OtherName(source.id) });
             }
             sources.push(source);
         }
@@ -147,26 +158,22 @@ impl Library {
 }
 
 /// Text of an ordinary file of a sensible size.
-fn text_of(path: &Path) -> Result<String, String> {
-    String::from_utf8(bytes_of(path)?).map_err(|error| format!("it is not UTF-8: {error}"))
+fn text_of(path: &Path) -> Result<String, FileError> {
+    Ok(String::from_utf8(bytes_of(path)?)?)
 }
 
 /// Text that another program wrote, in whatever encoding.
-fn foreign_text_of(path: &Path) -> Result<String, String> {
-    instruments::codec::encoding::decoded(&bytes_of(path)?)
+fn foreign_text_of(path: &Path) -> Result<String, FileError> {
+    Ok(decoded(&bytes_of(path)?)?)
 }
 
-fn bytes_of(path: &Path) -> Result<Vec<u8>, String> {
-    if !std::fs::metadata(path).map_err(|error| error.to_string())?.is_file() {
-        return Err("it is not an ordinary file".into());
+fn bytes_of(path: &Path) -> Result<Vec<u8>, FileError> {
+    if !std::fs::metadata(path)?.is_file() {
+        return Err(FileError::NotOrdinary);
     }
-    let file = std::fs::File::open(path).map_err(|error| error.to_string())?;
     let mut bytes = Vec::new();
-    file.take(MAX_BYTES + 1).read_to_end(&mut bytes).map_err(|error| error.to_string())?;
-    if bytes.len() as u64 > MAX_BYTES {
-        return Err(format!("it has more than {MAX_BYTES} bytes"));
-    }
-    Ok(bytes)
+    std::fs::File::open(path)?.take(MAX_BYTES + 1).read_to_end(&mut bytes)?;
+    if bytes.len() as u64 > MAX_BYTES { Err(FileError::TooLong) } else { Ok(bytes) }
 }
 
 #[cfg(test)]

@@ -1,8 +1,9 @@
 //! The conversation with an instrument of registers, whatever carries it.
 
+use super::ended::{BAD_IN_A_ROW, Ended};
 use super::endpoint::Due;
 use super::off::{self, OFF_ANSWER_MS, OffWay};
-use super::session::{BAD_IN_A_ROW, Ended, Periodic, Session};
+use super::session::{Periodic, Session};
 use instruments::profile::{FrameKind, Profile, Span};
 use instruments::schema::{Poll, Table, Write};
 use instruments::{FrameId, SetId};

@@ -6,10 +6,10 @@
 //! of its own: an exchange has the line to itself. What takes set-points has a line of its own, so that
 //! nothing holds up an 'off'.
 
+use super::ended::{BAD_IN_A_ROW, Closed, Ended};
 use super::modbus::{Blocks, Conversation, Registers, Trouble};
-use super::off::Closed;
 use super::serial::{Line, SharedLine};
-use super::session::{BAD_IN_A_ROW, Ended, Session};
+use super::session::Session;
 use super::setup::InstrumentSetup;
 use instruments::codec::modbus_rtu::{self as rtu, Request, RtuError};
 use instruments::profile::read_function;
@@ -25,7 +25,7 @@ const STOP_TRIES: u32 = 10;
 ///
 /// # Errors
 /// Where no thread can be had.
-pub fn spawn(instrument: &InstrumentSetup, session: Session) -> Result<JoinHandle<Closed>, String> {
+pub fn spawn(instrument: &InstrumentSetup, session: Session) -> Result<JoinHandle<Closed>, Ended> {
     let link = session.endpoint.profile().description.link.clone();
     let path = instrument.address.strip_prefix("rtu:").unwrap_or(&instrument.address).to_string();
     let rate_hz = instrument.rate_hz;

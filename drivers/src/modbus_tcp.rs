@@ -5,9 +5,9 @@
 //! issue 324), so every request has one here, and after any of them passes the connection is dropped
 //! and made anew. An answer that comes late then finds no socket: it can never become a force.
 
+use super::ended::{AddressError, Closed, Ended};
 use super::modbus::{Conversation, Registers, Trouble};
-use super::off::Closed;
-use super::session::{Ended, Session};
+use super::session::Session;
 use super::setup::InstrumentSetup;
 use super::trace::Traced;
 use instruments::schema::Table;
@@ -28,16 +28,13 @@ const LOOK_EVERY: Duration = Duration::from_millis(10);
 ///
 /// # Errors
 /// Where the address makes no sense or no thread can be had.
-pub fn spawn(instrument: &InstrumentSetup, session: Session) -> Result<JoinHandle<Closed>, String> {
+pub fn spawn(instrument: &InstrumentSetup, session: Session) -> Result<JoinHandle<Closed>, Ended> {
     let link = &session.endpoint.profile().description.link;
     let address = resolve(&instrument.address, link.port)?;
     let unit = instrument.unit.or(link.unit).unwrap_or(255);
     let (connect_ms, answer_ms) = (link.connect_timeout_ms, link.response_timeout_ms);
     let rate_hz = instrument.rate_hz;
-    let runtime = tokio::runtime::Builder::new_current_thread()
-        .enable_all()
-        .build()
-        .map_err(|error| error.to_string())?;
+    let runtime = tokio::runtime::Builder::new_current_thread().enable_all().build()?;
     session.spawn(move |session| {
         let clock = session.clock.clock().clone();
         let mut wire = Tcp::connect((&runtime, &clock), address, unit, connect_ms, answer_ms)?;
@@ -51,19 +48,18 @@ pub fn spawn(instrument: &InstrumentSetup, session: Session) -> Result<JoinHandl
 ///
 /// # Errors
 /// Where it stands for no address.
-pub fn resolve(address: &str, port: Option<u16>) -> Result<SocketAddr, String> {
+pub fn resolve(address: &str, port: Option<u16>) -> Result<SocketAddr, AddressError> {
     if address.starts_with('/') {
-        return Err(format!("`{address}` is a serial line, and the profile uses TCP: write rtu:{address}"));
+        return Err(AddressError::Serial(address.into()));
     }
     let with_port = if address.to_socket_addrs().is_ok() {
         address.to_string()
     } else {
-        format!("{address}:{}", port.ok_or("neither the address nor the profile names a port")?)
+        format!("{address}:{}", port.ok_or(AddressError::NoPort)?)
     };
-    let mut found = with_port
-        .to_socket_addrs()
-        .map_err(|_| format!("no machine is called `{address}`; give its name or IP address"))?;
-    found.next().ok_or_else(|| format!("`{address}` stands for no address"))
+    let found = with_port.to_socket_addrs();
+    let mut found = found.map_err(|_| AddressError::Unknown(address.into()))?;
+    found.next().ok_or_else(|| AddressError::Empty(address.into()))
 }
 
 /// Runs one request against its deadline. While the clock is held the deadline does not come nearer.

@@ -4,30 +4,16 @@
 //! drops [`crate::Links`]. A link that is down at that moment is reopened for the purpose. The driver does
 //! not report 'off' without reading it back.
 
-use super::session::{Ended, Session};
+use super::ended::Ended;
+pub use super::ended::OFF_WITHIN;
+use super::session::Session;
 use realtime::ports::Nanos;
-use serde::{Deserialize, Serialize};
 use std::time::Duration;
 
-/// A link tries this long to switch off and to read it back, reconnections included; then it is
-/// given up, and [`Closed::NotReadBack`] says so.
-pub const OFF_WITHIN: Duration = Duration::from_secs(2);
 /// An answer on the way to 'off' may take this long, in ms, where the profile allows less: a slow answer is still one.
 pub const OFF_ANSWER_MS: u32 = 600;
 /// Pause between two tries.
 const AGAIN: Duration = Duration::from_millis(4);
-
-/// How a link was closed.
-#[derive(Debug, Clone, PartialEq, Eq, Serialize, Deserialize)]
-#[serde(rename_all = "snake_case")]
-pub enum Closed {
-    /// A sensor, or an instrument without safe set-points: nothing to switch off.
-    NothingToSwitch,
-    /// The safe set-points were sent, and a later state of the instrument showed that it is off, or stands.
-    ReadBackOff,
-    /// No state has shown that. The reason in words.
-    NotReadBack(String),
-}
 
 /// What a transport can do for an 'off'.
 pub trait OffWay {

@@ -1,11 +1,11 @@
 //! A look at an instrument that has no profile yet: registers, CAN frames or bytes. It reads, for a bounded
 //! time, and writes nothing.
 
+use super::ended::{AddressError, Ended};
 use super::modbus::{Registers, Trouble};
 use super::modbus_rtu::Rtu;
 use super::modbus_tcp::{Tcp, resolve};
 use super::remedy::advice;
-use super::session::Ended;
 use super::transport::Address;
 use instruments::bus::CanEvent;
 use instruments::schema::Table;
@@ -60,44 +60,60 @@ pub struct Speed {
     pub bitrate: u32,
 }
 
-/// An error in words, with what to look at.
-fn words(ended: &Ended) -> String {
-    let problem = ended.to_string();
-    format!("{problem}; {}", advice(&problem))
+/// Why a look failed, with what to look at.
+#[derive(Debug, thiserror::Error)]
+#[allow(missing_docs, reason = "the message of an error says what it is")]
+pub enum PeekError {
+    #[error(transparent)]
+    Address(#[from] AddressError),
+    #[error(transparent)]
+    Io(#[from] std::io::Error),
+    #[error("{0}; {advice}", advice = advice(&.0.to_string()))]
+    Link(#[from] Ended),
+    #[error("the instrument refused: {0}")]
+    Refused(String),
+    #[error("{0}; check speed, format and wiring of the line")]
+    Corrupt(String),
+    #[error("{0} is a CAN bus and has no registers; leave them out")]
+    NoRegisters(String),
+    #[error("{0} is a CAN bus and has no lines")]
+    NoLines(String),
+}
+
+impl From<Trouble> for PeekError {
+    fn from(trouble: Trouble) -> Self {
+        match trouble {
+            Trouble::Refused(why) => Self::Refused(why),
+            Trouble::Corrupt(why) => Self::Corrupt(why),
+            Trouble::Ended(ended) => ended.into(),
+        }
+    }
 }
 
 /// Reads `count` registers from `first` on, over Modbus TCP or RTU.
 ///
 /// # Errors
-/// Nobody there, or an answer that is no good, in words with the remedy.
+/// Nobody there, or an answer that is no good.
 pub fn registers(
     place: &Place,
     speed: &Speed,
     unit: u8,
     table: Table,
     (first, count): (u16, u16),
-) -> Result<Vec<u16>, String> {
-    let read = match place {
+) -> Result<Vec<u16>, PeekError> {
+    let bytes = match place {
         Place::Tcp(host) => {
             let address = resolve(host, Some(502))?;
-            let runtime = tokio::runtime::Builder::new_current_thread()
-                .enable_all()
-                .build()
-                .map_err(|error| error.to_string())?;
+            let runtime = tokio::runtime::Builder::new_current_thread().enable_all().build()?;
             let clock = Instant::now().into();
-            let connected = Tcp::connect((&runtime, &clock), address, unit, PATIENCE_MS, PATIENCE_MS);
-            connected.map_err(|ended| words(&ended))?.read(table, first, count)
+            Tcp::connect((&runtime, &clock), address, unit, PATIENCE_MS, PATIENCE_MS)?
+                .read(table, first, count)?
         }
-        Place::Serial(path) => Rtu::open(path, speed.baud, &speed.format, unit, PATIENCE_MS)
-            .map_err(|ended| words(&ended))?
-            .read(table, first, count),
-        Place::Can(name) => return Err(format!("{name} is a CAN bus and has no registers; leave them out")),
+        Place::Serial(path) => {
+            Rtu::open(path, speed.baud, &speed.format, unit, PATIENCE_MS)?.read(table, first, count)?
+        }
+        Place::Can(name) => return Err(PeekError::NoRegisters(name.clone())),
     };
-    let bytes = read.map_err(|trouble| match trouble {
-        Trouble::Refused(why) => format!("the instrument refused: {why}"),
-        Trouble::Corrupt(why) => format!("{why}; check speed, format and wiring of the line"),
-        Trouble::Ended(ended) => words(&ended),
-    })?;
     Ok(bytes.chunks_exact(2).map(|pair| u16::from_be_bytes([pair[0], pair[1]])).collect())
 }
 
@@ -113,17 +129,19 @@ pub struct Frames {
 /// Listens to a CAN bus; frames by identifier, and whether that has 29 bits.
 ///
 /// # Errors
-/// No bus, or one that fails, in words.
-pub fn frames(name: &str, bitrate: u32, long: Duration) -> Result<BTreeMap<(u32, bool), Frames>, String> {
-    let mut port = super::can::open(name, bitrate).map_err(|ended| words(&ended))?;
+/// No bus, or one that fails.
+pub fn frames(name: &str, bitrate: u32, long: Duration) -> Result<BTreeMap<(u32, bool), Frames>, PeekError> {
+    let mut port = super::can::open(name, bitrate)?;
     let (until, mut seen) = (Instant::now() + long, BTreeMap::<_, Frames>::new());
     while Instant::now() < until {
-        match port.receive(until).map_err(|error| error.to_string())? {
+        match port.receive(until)? {
             Some(CanEvent::Frame(frame, _)) => {
                 let of = seen.entry((frame.id, frame.extended)).or_default();
                 *of = Frames { count: of.count + 1, data: frame.data().to_vec() };
             }
-            Some(CanEvent::BusOff | CanEvent::Passive) => return Err(super::can::PASSIVE.into()),
+            Some(CanEvent::BusOff | CanEvent::Passive) => {
+                return Err(std::io::Error::other(super::can::PASSIVE).into());
+            }
             Some(CanEvent::Warning | CanEvent::Other) | None => {}
         }
     }
@@ -133,15 +151,15 @@ pub fn frames(name: &str, bitrate: u32, long: Duration) -> Result<BTreeMap<(u32,
 /// Listens to a serial line or a TCP server, and returns the bytes that came.
 ///
 /// # Errors
-/// Nobody there, or a line that fails, in words.
-pub fn bytes(place: &Place, speed: &Speed, long: Duration) -> Result<Vec<u8>, String> {
+/// Nobody there, or a line that fails.
+pub fn bytes(place: &Place, speed: &Speed, long: Duration) -> Result<Vec<u8>, PeekError> {
     let address = match place {
         Place::Serial(path) => Address::Serial(path.clone(), speed.baud, speed.format.clone()),
         Place::Tcp(host) => Address::Tcp(resolve(host, None)?),
-        Place::Can(name) => return Err(format!("{name} is a CAN bus and has no lines")),
+        Place::Can(name) => return Err(PeekError::NoLines(name.clone())),
     };
     let patience = Duration::from_millis(PATIENCE_MS.into());
-    let mut transport = address.open(patience).map_err(|ended| words(&ended))?;
+    let mut transport = address.open(patience)?;
     let until = Instant::now() + long;
     let (mut came, mut buffer) = (Vec::new(), [0; 512]);
     while Instant::now() < until && came.len() < MOST_BYTES {
@@ -150,7 +168,7 @@ pub fn bytes(place: &Place, speed: &Speed, long: Duration) -> Result<Vec<u8>, St
             Ok(count) => came.extend_from_slice(&buffer[..count]),
             // A server that closes after its words has shown them.
             Err(_) if !came.is_empty() => break,
-            Err(ended) => return Err(words(&ended)),
+            Err(ended) => return Err(ended.into()),
         }
     }
     came.truncate(MOST_BYTES);

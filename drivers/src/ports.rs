@@ -4,6 +4,7 @@
 //! Nothing here blocks, locks or allocates after it was made.
 
 use crate::mailbox::Mailbox;
+use crate::setup::SetupError;
 use realtime::ports::{
     Amplifier, AmplifierState, Contacts, ForceSensor, Forces, Nanos, NoData, SafetyInputs, Stage, StageState,
     SupplyCommand, SupplyState, SupplySwitch,
@@ -127,7 +128,7 @@ impl ForceSensor for Pair {
 ///
 /// # Errors
 /// Where an axis is given by no instrument or by two.
-pub fn compose(mut ports: Vec<(ForcePort, (bool, bool))>) -> Result<Box<dyn ForceSensor>, String> {
+pub fn compose(mut ports: Vec<(ForcePort, (bool, bool))>) -> Result<Box<dyn ForceSensor>, SetupError> {
     let axes: Vec<(bool, bool)> = ports.iter().map(|(_, axes)| *axes).collect();
     match axes.as_slice() {
         [(true, true)] => Ok(Box::new(ports.remove(0).0)),
@@ -139,7 +140,7 @@ pub fn compose(mut ports: Vec<(ForcePort, (bool, bool))>) -> Result<Box<dyn Forc
             let lateral = ports.remove(1).0;
             Ok(Box::new(Pair { lateral, normal: ports.remove(0).0 }))
         }
-        _ => Err("the [[force]] instruments must give each of the axes `lateral` and `normal` once".into()),
+        _ => Err(SetupError::Axes),
     }
 }
 

@@ -1,6 +1,6 @@
 //! Serial lines.
 
-use super::session::Ended;
+use super::ended::Ended;
 use super::trace;
 use serialport::{DataBits, Parity, SerialPort, StopBits};
 use std::io::{Read, Write};

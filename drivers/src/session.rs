@@ -1,7 +1,7 @@
 //! The life of a link: connect, converse until something is wrong, tell the loop, back off, connect anew.
 
-use super::endpoint::{BadFrame, Endpoint};
-use super::off::{Closed, OFF_WITHIN};
+use super::ended::{Closed, Ended, OFF_WITHIN};
+use super::endpoint::Endpoint;
 use realtime::clock::{Clock, Participant};
 use realtime::ports::{Nanos, NoData};
 use std::convert::Infallible;
@@ -18,47 +18,6 @@ pub const LONGEST_SLEEP: Duration = Duration::from_millis(20);
 /// How far a held clock may pass the time at which a driver's thread was to look at it again: a turn of
 /// requests and answers on a machine with time to spare.
 const SLACK: Nanos = Nanos(2_000_000);
-
-/// So many bad answers in a row end a connection.
-pub const BAD_IN_A_ROW: u32 = 3;
-
-/// Why a conversation ended.
-#[derive(Debug, thiserror::Error)]
-pub enum Ended {
-    /// The thread is to end.
-    #[error("stopped")]
-    Stopped,
-    /// A deadline passed.
-    #[error("no answer within {0} ms")]
-    Timeout(u32),
-    /// A deadline passed in the midst of an answer: what came of it, and the likely cause.
-    #[error("{0}")]
-    Cut(String),
-    /// The line itself failed.
-    #[error("{0}")]
-    Io(String),
-    /// The instrument refuses a request.
-    #[error("the instrument refused: {0}")]
-    Refused(String),
-    /// Answers do not pass their checks.
-    #[error("{BAD_IN_A_ROW} bad answers in a row; the last: {0}")]
-    Corrupt(String),
-    /// A frame that must not become a sample.
-    #[error(transparent)]
-    Frame(#[from] BadFrame),
-    /// 'Off' was sent again and again, and the instrument still shows 'on', or shows nothing.
-    #[error("the instrument did not show 'off' within {} s of the command", OFF_WITHIN.as_secs())]
-    StillOn,
-    /// The driver panicked: a fault of this program.
-    #[error("the driver panicked: {0}")]
-    Panicked(String),
-}
-
-impl From<std::io::Error> for Ended {
-    fn from(error: std::io::Error) -> Self {
-        Self::Io(error.to_string())
-    }
-}
 
 /// Something that happens again and again.
 #[derive(Debug, Clone)]
@@ -95,7 +54,7 @@ pub struct Session {
     /// Set when the thread is to send the safe set-points and end.
     pub stop: Arc<AtomicBool>,
     /// Takes the outcome of the first connection, once.
-    pub ready: Option<SyncSender<Result<(), String>>>,
+    pub ready: Option<SyncSender<Result<(), Ended>>>,
     /// When the thread is to be done with switching off; known from the moment that it sees `stop`.
     off_by: Option<Nanos>,
 }
@@ -106,7 +65,7 @@ impl Session {
         endpoint: Endpoint,
         clock: impl Into<Clock>,
         stop: Arc<AtomicBool>,
-        ready: SyncSender<Result<(), String>>,
+        ready: SyncSender<Result<(), Ended>>,
     ) -> Self {
         Self { endpoint, clock: clock.into().join(SLACK), stop, ready: Some(ready), off_by: None }
     }
@@ -128,7 +87,7 @@ impl Session {
     }
 
     /// Tells whoever opened the rig how the first connection went. Returns whether it was the first.
-    pub fn tell(&mut self, outcome: Result<(), String>) -> bool {
+    pub fn tell(&mut self, outcome: Result<(), Ended>) -> bool {
         self.ready.take().is_some_and(|ready| {
             let _ = ready.send(outcome);
             true
@@ -153,12 +112,12 @@ impl Session {
     pub fn spawn(
         mut self,
         mut converse: impl FnMut(&mut Session) -> Result<Infallible, Ended> + Send + 'static,
-    ) -> Result<JoinHandle<Closed>, String> {
+    ) -> Result<JoinHandle<Closed>, Ended> {
         let name: String = self.endpoint.profile().id().chars().take(15).collect();
         // At the level of the terminal's default, so that what is shown has its instrument.
         let span = tracing::warn_span!("instrument", id = self.endpoint.profile().id());
         let run = move || span.in_scope(|| self.keep_up(&mut converse));
-        std::thread::Builder::new().name(name).spawn(run).map_err(|error| error.to_string())
+        std::thread::Builder::new().name(name).spawn(run).map_err(Ended::from)
     }
 
     fn keep_up(&mut self, converse: &mut dyn FnMut(&mut Session) -> Result<Infallible, Ended>) -> Closed {
@@ -187,7 +146,7 @@ impl Session {
             last_words = ended.to_string();
             health.problem(last_words.clone());
             tracing::info!(%ended, "the link went down");
-            if self.tell(Err(last_words.clone())) {
+            if self.tell(Err(ended)) {
                 return self.closed(last_words); // whoever opened the rig wants to know, not to wait
             }
             // A connection that gave samples was a good one: begin with the short pause again.

@@ -1,10 +1,44 @@
 //! The instruments' part of a setup.
 
 use super::OpenError;
+use super::ended::AddressError;
 use super::library::Source;
 use instruments::Profile;
 use serde::{Deserialize, Serialize};
 use std::sync::Arc;
+
+/// Names of the safety contacts' signals.
+pub(crate) const CONTACTS: [&str; 3] = ["emergency_stop", "interlock", "dead_man"];
+
+/// A setup that does not fit the instrument's profile, or an address that leads nowhere.
+#[derive(Debug, Clone, PartialEq, Eq, thiserror::Error)]
+#[allow(missing_docs, reason = "the message of an error says what it is")]
+pub enum SetupError {
+    #[error("the profile has no signal `{name}`; it has {known}")]
+    NoSignal { name: String, known: String },
+    #[error("the profile has no set-point `{0}`")]
+    NoSetPoint(&'static str),
+    #[error("say which signal is `lateral` or `normal`; the profile has {known}")]
+    NoAxis { known: String },
+    #[error("the gain of axis `{0}` must not be zero, and both numbers must be finite")]
+    Gain(&'static str),
+    #[error("the [[force]] instruments must give each of the axes `lateral` and `normal` once")]
+    Axes,
+    #[error("`{0}` must be above zero")]
+    NotPositive(&'static str),
+    #[error("the instrument loads nothing: say the weight that does, as `dead_weight_n`")]
+    NoLoad,
+    #[error("its set-point `closed` has no `safe` value: it could not be opened at the end")]
+    NoSafeValue,
+    #[error("`wired`: the profile has no contact `{0}`; contacts: {known}", known = CONTACTS.join(", "))]
+    NoContact(String),
+    #[error("none of the contacts {} is there and wired", CONTACTS.join(", "))]
+    NoContacts,
+    #[error("set-points do not go by plain CAN messages; only sensors can be reached so")]
+    PlainCan,
+    #[error(transparent)]
+    Address(#[from] AddressError),
+}
 
 /// Which instruments make up the rig.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
@@ -107,6 +141,12 @@ impl InstrumentSetup {
     /// Where there is none, or it does not hold.
     pub fn description(&self) -> Result<Profile, OpenError> {
         self.source.as_ref().map_or_else(|| super::profile(&self.profile), |source| source.profile())
+    }
+
+    /// The refusal of its setup.
+    pub fn mismatch(&self, problem: impl Into<SetupError>) -> OpenError {
+        let (id, address, problem) = (self.profile.clone(), self.address.clone(), problem.into());
+        OpenError::Mismatch { id, address, problem }
     }
 
     /// An instrument of that profile at that address, all else by the profile.

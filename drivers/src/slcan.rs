@@ -1,7 +1,7 @@
 //! CAN through a serial adapter (slcan).
 
+use super::ended::Ended;
 use super::serial::Line;
-use super::session::Ended;
 use instruments::bus::{CanEvent, CanPort};
 use instruments::codec::can::{CanFrame, SlcanReader, SlcanSaid, slcan_line, slcan_speed};
 use std::collections::VecDeque;

@@ -1,6 +1,7 @@
 //! Frames that come by themselves: bytes in, samples out, whatever carries them.
 
-use super::session::{Ended, LONGEST_SLEEP, Session};
+use super::ended::Ended;
+use super::session::{LONGEST_SLEEP, Session};
 use instruments::codec::stream::Cutter;
 use instruments::schema::Stream;
 use std::sync::atomic::Ordering;

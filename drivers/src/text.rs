@@ -5,10 +5,11 @@
 //! sends without a request are removed before the driver looks for an answer: they must never be taken for
 //! one. A binary answer is framed by its length, since its bytes may look like the end of a line.
 
+use super::ended::{BAD_IN_A_ROW, Closed, Ended};
 use super::endpoint::Due;
-use super::off::{self, Closed, OFF_ANSWER_MS, OffWay};
+use super::off::{self, OFF_ANSWER_MS, OffWay};
 use super::remedy;
-use super::session::{BAD_IN_A_ROW, Ended, Periodic, Session};
+use super::session::{Periodic, Session};
 use super::setup::InstrumentSetup;
 use super::transport::{Address, Transport};
 use instruments::codec::pattern::Pattern;
@@ -35,7 +36,7 @@ const COMMAND_RATE_HZ: f64 = 500.0;
 ///
 /// # Errors
 /// Where the address makes no sense or no thread can be had.
-pub fn spawn(instrument: &InstrumentSetup, session: Session) -> Result<JoinHandle<Closed>, String> {
+pub fn spawn(instrument: &InstrumentSetup, session: Session) -> Result<JoinHandle<Closed>, Ended> {
     let link = session.endpoint.profile().description.link.clone();
     let at = Address::of(&instrument.address, &link, instrument.baud)?;
     let rate_hz = instrument.rate_hz;

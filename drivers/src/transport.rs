@@ -1,9 +1,9 @@
 //! What carries lines of text, blocks of bytes and streams: a serial line, TCP, datagrams, or the attributes
 //! of a device that the kernel drives.
 
+use super::ended::{AddressError, Ended};
 use super::modbus_tcp::resolve;
 use super::serial::Line;
-use super::session::Ended;
 use super::trace;
 use instruments::schema::{Link, LinkKind};
 use std::io::{ErrorKind, Read, Write};
@@ -29,7 +29,7 @@ impl Address {
     ///
     /// # Errors
     /// Where it makes no sense.
-    pub fn of(address: &str, link: &Link, baud: Option<u32>) -> Result<Self, String> {
+    pub fn of(address: &str, link: &Link, baud: Option<u32>) -> Result<Self, AddressError> {
         let network = matches!(link.kind, LinkKind::Scpi | LinkKind::Tcp | LinkKind::Udp);
         match (address.strip_prefix("tcp:"), link.kind) {
             (_, LinkKind::Sysfs) => Ok(Self::Folder(address.into())),

@@ -4,10 +4,10 @@
 //! metres. They are queried once, before a calibration, and never changed. Each instrument numbers its
 //! decoders differently, and a wrong one gives a plausible wrong amplitude, so their names are queried first.
 
-use super::OpenError;
+use super::endpoint::BadFrame;
 use super::library::Source;
 use super::serial::Line;
-use super::session::Ended;
+use super::{Ended, OpenError};
 use calibration::amplitude::vibrometer::Decoder;
 use instruments::codec::text::quantity;
 use instruments::profile::FrameKind;
@@ -77,15 +77,9 @@ impl Settings {
     ///
     /// # Errors
     /// It does not: the amplitude would come out too small.
-    pub fn covers(&self, frequency_hz: f64) -> Result<(), String> {
-        if frequency_hz <= self.max_frequency_hz {
-            return Ok(());
-        }
-        Err(format!(
-            "decoder {} reaches to {:.0} Hz in this range, the drive is at {frequency_hz:.0} Hz: choose another decoder or \
-             range at the controller",
-            self.decoder, self.max_frequency_hz
-        ))
+    pub fn covers(&self, frequency_hz: f64) -> Result<(), BeyondBand> {
+        let (decoder, most_hz) = (self.decoder.clone(), self.max_frequency_hz);
+        if frequency_hz <= most_hz { Ok(()) } else { Err(BeyondBand { decoder, most_hz, frequency_hz }) }
     }
 }
 
@@ -103,18 +97,32 @@ impl std::fmt::Display for Settings {
     }
 }
 
+/// A drive beyond the decoder's band.
+#[derive(Debug, Clone, PartialEq, thiserror::Error)]
+#[error(
+    "decoder {decoder} reaches to {most_hz:.0} Hz in this range, the drive is at {frequency_hz:.0} Hz: \
+     choose another decoder or range at the controller"
+)]
+#[allow(missing_docs, reason = "the message of an error says what its fields are")]
+pub struct BeyondBand {
+    pub decoder: String,
+    pub most_hz: f64,
+    pub frequency_hz: f64,
+}
+
 /// Asks a controller for the settings of the decoder that the setup names.
 ///
 /// # Errors
 /// A profile that is not a vibrometer's, a line that cannot be opened, a decoder that is not there, answers
-/// that make no sense, settings that changed while they were read; in words.
-pub fn settings(setup: &VibrometerSetup) -> Result<Settings, String> {
-    let profile = setup.description().map_err(|error| error.to_string())?;
+/// that make no sense, settings that changed while they were read.
+pub fn settings(setup: &VibrometerSetup) -> Result<Settings, OpenError> {
+    let profile = setup.description()?;
     let link = profile.description.link.clone();
     let (LinkKind::Serial, Some(choice)) = (link.kind, link.choice.clone()) else {
-        return Err(format!("profile `{}` is not that of a vibrometer's controller", setup.profile));
+        return Err(OpenError::NoVibrometer(setup.profile.clone()));
     };
-    let failed = |error: Ended| format!("`{}` at {}: {error}", setup.profile, setup.address);
+    let (id, address) = (&setup.profile, &setup.address);
+    let failed = |problem| OpenError::Beside { id: id.clone(), address: address.clone(), problem };
     let format = link.format.clone().unwrap_or_else(|| "8N1".into());
     let line =
         Line::open(&setup.address, setup.baud.or(link.baud).unwrap_or(115_200), &format).map_err(failed)?;
@@ -131,15 +139,13 @@ pub fn settings(setup: &VibrometerSetup) -> Result<Settings, String> {
             Err(error) => return Err(failed(error)),
         }
     }
-    let number = choose(&decoders, setup.decoder.as_deref())
-        .map_err(|problem| format!("`{}` at {}: {problem}", setup.profile, setup.address))?;
+    let number = choose(&decoders, setup.decoder.as_deref());
+    let number = number.map_err(|problem| failed(BadFrame::WrongInstrument(problem).into()))?;
     let mut read = || talk.settings(&profile, number, &decoders).map_err(failed);
     let (first, second) = (read()?, read()?);
     if first != second {
-        return Err(format!(
-            "`{}` at {}: the settings changed while they were read; let nobody touch the controller and ask again",
-            setup.profile, setup.address
-        ));
+        let why = "the settings changed while they were read; let nobody touch the controller and ask again";
+        return Err(failed(BadFrame::Corrupt(why.into()).into()));
     }
     Ok(first)
 }
@@ -276,6 +282,6 @@ mod tests {
             decoders: vec!["VD-09".into()],
         };
         assert!(settings.covers(19e3).is_ok());
-        assert!(settings.covers(27.5e3).unwrap_err().contains("20000 Hz"));
+        assert!(settings.covers(27.5e3).unwrap_err().to_string().contains("20000 Hz"));
     }
 }

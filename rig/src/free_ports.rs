@@ -57,7 +57,8 @@ fn can_be_served(instrument: &InstrumentSetup) -> Result<(), Closed> {
     let remedy = "end the program that has it, or state port 0: any free one is taken";
     match kind(instrument) {
         Some((LinkKind::ModbusTcp | LinkKind::Scpi, port)) if !instrument.address.starts_with("rtu:") => {
-            let address = resolve(&instrument.address, port).map_err(|e| (e, "correct the address"))?;
+            let address = resolve(&instrument.address, port);
+            let address = address.map_err(|e| (e.to_string(), "correct the address"))?;
             TcpListener::bind(address).map(drop).map_err(|e| (format!("cannot be served there: {e}"), remedy))
         }
         Some((LinkKind::Can | LinkKind::Canopen, _)) if !instrument.address.starts_with("slcan:") => {
@@ -78,7 +79,7 @@ fn opens(instrument: &InstrumentSetup) -> Result<(), Closed> {
     let address = instrument.address.as_str();
     let socket = |address: &str| {
         let found = resolve(address, port)
-            .map_err(|e| (e, "correct the address; `--offline` leaves the ports out"))?;
+            .map_err(|e| (e.to_string(), "correct the address; `--offline` leaves the ports out"))?;
         let accepted = TcpStream::connect_timeout(&found, ACCEPTS_WITHIN);
         accepted.map(drop).map_err(|e| {
             (

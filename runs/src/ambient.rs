@@ -256,13 +256,9 @@ impl SetupFile {
             }
         }
         let Some(chamber) = &self.chamber else { return };
-        match chamber.description() {
-            Ok(profile) if drivers::chamber::serves(&profile).is_ok() => {}
-            Ok(profile) => {
-                let why = drivers::chamber::serves(&profile).err().unwrap_or_default();
-                wrong.add(&["chamber", "profile"], why, None);
-            }
-            Err(why) => wrong.add(&["chamber", "profile"], why.to_string(), None),
+        let served = chamber.description().and_then(|profile| drivers::chamber::serves(&profile));
+        if let Err(why) = served {
+            wrong.add(&["chamber", "profile"], why.to_string(), None);
         }
     }
 }

@@ -233,7 +233,7 @@ fn talk(setup: &Setup, plan: Option<&Plan>) -> miette::Result<Vec<Finding>> {
         findings.push(Finding::new(
             format!("vibrometer `{}` at {}", v.profile, v.address),
             settings.is_ok(),
-            settings.map_or_else(|problem| problem, |settings| settings.to_string()),
+            settings.map_or_else(|problem| problem.to_string(), |settings| settings.to_string()),
             "check line, power and that no other program holds it; Echo must be off",
         ));
     }

@@ -27,7 +27,7 @@ fn what_is_periodic_is_due_from_its_time_on() {
     assert_eq!([499, 500, 501].map(|now| periodic.is_due(Nanos(now))), [false, true, true]);
 }
 
-fn alone() -> (Session, Receiver<Result<(), String>>) {
+fn alone() -> (Session, Receiver<Result<(), Ended>>) {
     let (ready, opened) = sync_channel(4);
     (Session::new(amplifier().0, Instant::now() - Duration::from_secs(3), Arc::default(), ready), opened)
 }
@@ -36,7 +36,7 @@ fn alone() -> (Session, Receiver<Result<(), String>>) {
 fn the_first_outcome_is_told_once() {
     let (mut session, opened) = alone();
     assert!(session.is_first() && session.tell(Ok(())));
-    assert!(!session.is_first() && !session.tell(Err("later".into())));
+    assert!(!session.is_first() && !session.tell(Err(Ended::Stopped)));
     assert_eq!((opened.try_recv(), opened.try_recv().is_err()), (Ok(Ok(())), true));
 }
 

@@ -126,7 +126,8 @@ fn instrument(found: &Found, look: &Look, target: &Target<'_>) -> Finding {
         Err(error) => {
             let problem = match error {
                 // The subject names the instrument already.
-                OpenError::Mismatch { problem, .. } | OpenError::Link { problem, .. } => problem.clone(),
+                OpenError::Mismatch { problem, .. } => problem.to_string(),
+                OpenError::Link { problem, .. } => problem.to_string(),
                 other => other.to_string(),
             };
             let advice = drivers::remedy::advice(&problem);

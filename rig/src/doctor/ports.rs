@@ -20,11 +20,6 @@ enum Port {
 }
 
 fn open_one(role: Role, instrument: &InstrumentSetup, epoch: Instant) -> Result<(Links, Port), OpenError> {
-    let wrong = |problem: String| OpenError::Mismatch {
-        id: instrument.profile.clone(),
-        address: instrument.address.clone(),
-        problem,
-    };
     let profile = instrument.description()?;
     let (endpoint, port) = match role {
         "force" => Endpoint::force(profile, instrument).map(|(e, (port, axes))| (e, Port::Force(port, axes))),
@@ -33,7 +28,7 @@ fn open_one(role: Role, instrument: &InstrumentSetup, epoch: Instant) -> Result<
         "supply_relay" => Endpoint::supply(profile).map(|(e, port)| (e, Port::Supply(port))),
         _ => Endpoint::contacts(profile, instrument).map(|(e, port)| (e, Port::Contacts(port))),
     }
-    .map_err(wrong)?;
+    .map_err(|problem| instrument.mismatch(problem))?;
     Ok((drivers::open_one(instrument, endpoint, epoch)?, port))
 }
 

@@ -217,7 +217,7 @@ fn one_fits(table: &str, instrument: &InstrumentSetup) -> Result<(), (&'static s
         "supply_relay" => Endpoint::supply(profile).map(drop),
         _ => Endpoint::contacts(profile, instrument).map(drop),
     }
-    .map_err(|problem| ("profile", problem))?;
+    .map_err(|problem| ("profile", problem.to_string()))?;
     match share {
         Some(share) if share > 1.0 => Err((
             if instrument.rate_hz.is_some() { "rate_hz" } else { "profile" },

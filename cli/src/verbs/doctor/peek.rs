@@ -74,7 +74,7 @@ pub fn run(args: &Args, json: bool) -> miette::Result<ExitCode> {
     let place = Place::of(&args.address);
     let speed = Speed { baud: args.baud, format: args.format.clone(), bitrate: args.bitrate };
     let long = args.seconds;
-    let failed = |why: String| miette::miette!("{}: {why}", args.address);
+    let failed = |why: peek::PeekError| miette::miette!("{}: {why}", args.address);
     if let Some((first, count)) = args.registers {
         let table = match args.table {
             Kind::Holding => Table::Holding,

@@ -22,7 +22,7 @@ type Script = dyn FnMut(usize, &mut Session) -> Ended + Send;
 /// A link on its thread.
 struct Link {
     stop: Arc<AtomicBool>,
-    opened: Receiver<Result<(), String>>,
+    opened: Receiver<Result<(), Ended>>,
     port: Arc<Mutex<AmplifierPort>>,
     /// When each conversation began and ended.
     times: Arc<Mutex<Vec<(Instant, Instant)>>>,
@@ -91,7 +91,7 @@ fn switches_off(number: usize, session: &mut Session) -> Ended {
 fn nobody_there_is_told_to_whoever_opens_and_not_tried_again() {
     let link = Link::start(1, 1, Box::new(|_, _| io("nobody there")));
     assert_eq!(link.closed(), Closed::NotReadBack("nobody there".into()));
-    assert_eq!(link.opened.recv(), Ok(Err("nobody there".into())));
+    assert_eq!(link.opened.recv(), Ok(Err(io("nobody there"))));
     assert_eq!((link.conversations(), link.health.report().last_problem.as_str()), (1, "nobody there"));
     // A sensor has nothing that could be on.
     let setup = InstrumentSetup::new("muprime-force2", "");
