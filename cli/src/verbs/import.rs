@@ -175,7 +175,7 @@ fn map_of(args: &Args, grid: &Grid) -> miette::Result<Map> {
         Err(more) => wrong.extend(more),
     }
     if !wrong.is_empty() {
-        miette::bail!("{}", wrong.join("\n"));
+        miette::bail!("{}", wrong.iter().map(ToString::to_string).collect::<Vec<_>>().join("\n"));
     }
     if !args.map.is_empty() {
         return Ok(map);

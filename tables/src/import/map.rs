@@ -4,6 +4,40 @@ use super::grid::{Block, Grid};
 use super::targets::{Id, Kind, TARGETS, Target};
 use super::units::{Dimension, Unit};
 
+/// What is wrong with an entry of `--map` or `--set`, or with the map under a second header (in row `row`).
+#[derive(Clone, Debug, PartialEq, Eq, thiserror::Error)]
+#[allow(missing_docs, reason = "the message of an error says what it is")]
+pub enum MapError {
+    #[error("'{0}': HEADER=TARGET:UNIT is needed")]
+    MapEntry(String),
+    #[error("'{0}' is not a target; there are {known}", known = names())]
+    Target(String),
+    #[error("'{name}' has no unit ('{unit}')")]
+    Unitless { name: String, unit: String },
+    #[error("'{unit}' is not a unit of {name}; there are {}", .dimension.known())]
+    Unit { name: String, unit: String, dimension: Dimension },
+    #[error("'{name}' needs a unit, as in {name}:{}; there are {}", .dimension.si(), .dimension.known())]
+    NeedsUnit { name: String, dimension: Dimension },
+    #[error("the table has no column '{header}'; it has {there}")]
+    NoColumn { header: String, there: String },
+    #[error("several columns are called '{0}'; name them by number, as in #3")]
+    SeveralColumns(String),
+    #[error("--set {0}: NAME=VALUE is needed")]
+    SetEntry(String),
+    #[error("--set {0}: no such target; there are {known}", known = names())]
+    SetTarget(String),
+    #[error("--set {name}: '{value}' cannot be read")]
+    SetValue { name: String, value: String },
+    #[error("--set {0}: a count differs from row to row")]
+    SetCount(String),
+    #[error("--set {name}: '{unit}' is not a unit; there are {}", .dimension.known())]
+    SetUnit { name: String, unit: String, dimension: Dimension },
+    #[error("row {row} is a second header, without a column '{header}'")]
+    NotUnder { row: u64, header: String },
+    #[error("row {row} is a second header, with another unit of '{header}' ('{other}')")]
+    OtherUnit { row: u64, header: String, other: String },
+}
+
 /// A column of the source that is taken.
 #[derive(Clone, Debug)]
 pub struct Taken {
@@ -78,7 +112,7 @@ impl Map {
     ///
     /// # Errors
     /// Everything that is wrong with them at once.
-    pub fn stated(grid: &Grid, entries: &[String]) -> Result<Vec<Taken>, Vec<String>> {
+    pub fn stated(grid: &Grid, entries: &[String]) -> Result<Vec<Taken>, Vec<MapError>> {
         let (mut taken, mut wrong) = (Vec::new(), Vec::new());
         for entry in entries.iter().flat_map(|e| parted(e)) {
             match column(grid, &entry) {
@@ -93,7 +127,7 @@ impl Map {
     ///
     /// # Errors
     /// Everything that is wrong at once.
-    pub fn set(&mut self, entries: &[String]) -> Result<(), Vec<String>> {
+    pub fn set(&mut self, entries: &[String]) -> Result<(), Vec<MapError>> {
         let mut wrong = Vec::new();
         for entry in entries.iter().flat_map(|e| parted(e)) {
             match constant(&entry) {
@@ -182,14 +216,15 @@ fn names() -> String {
 }
 
 /// The target and the unit of `TARGET[:UNIT]`. The name of a column of the point table states its unit.
-fn target_of(text: &str) -> Result<(usize, Unit, String), String> {
+fn target_of(text: &str) -> Result<(usize, Unit, String), MapError> {
     let (name, unit_text) =
         text.split_once(':').map_or((text.trim(), None), |(n, u)| (n.trim(), Some(u.trim())));
-    let at = Target::named(name).ok_or_else(|| format!("'{name}' is not a target; there are {}", names()))?;
+    let own = || name.to_string();
+    let at = Target::named(name).ok_or_else(|| MapError::Target(own()))?;
     let target = &TARGETS[at];
     let Kind::Number(dimension) = target.kind else {
         return match unit_text {
-            Some(unit) => Err(format!("'{name}' has no unit ('{unit}')")),
+            Some(unit) => Err(MapError::Unitless { name: own(), unit: unit.into() }),
             None => Ok((at, Unit::SI, String::new())),
         };
     };
@@ -197,23 +232,16 @@ fn target_of(text: &str) -> Result<(usize, Unit, String), String> {
     let bare = matches!(dimension, Dimension::Ratio) || by_column;
     match unit_text {
         Some(text) => {
-            let unit = Unit::parse(dimension, text).ok_or_else(|| {
-                format!("'{text}' is not a unit of {name}; there are {}", dimension.known())
-            })?;
-            Ok((at, unit, text.to_string()))
+            let unknown = || MapError::Unit { name: own(), unit: text.into(), dimension };
+            Ok((at, Unit::parse(dimension, text).ok_or_else(unknown)?, text.to_string()))
         }
         None if bare => Ok((at, Unit::SI, dimension.si().to_string())),
-        None => Err(format!(
-            "'{name}' needs a unit, as in {name}:{}; there are {}",
-            dimension.si(),
-            dimension.known()
-        )),
+        None => Err(MapError::NeedsUnit { name: own(), dimension }),
     }
 }
 
-fn column(grid: &Grid, entry: &str) -> Result<Taken, String> {
-    let (header, rest) =
-        entry.rsplit_once('=').ok_or_else(|| format!("'{entry}': HEADER=TARGET:UNIT is needed"))?;
+fn column(grid: &Grid, entry: &str) -> Result<Taken, MapError> {
+    let (header, rest) = entry.rsplit_once('=').ok_or_else(|| MapError::MapEntry(entry.into()))?;
     let header = header.trim();
     // Within the one group that is read its columns have short names.
     let last = header.rsplit('/').next().unwrap_or(header);
@@ -232,35 +260,32 @@ fn column(grid: &Grid, entry: &str) -> Result<Taken, String> {
         ([], [], Some(n)) if (1..=grid.header.len()).contains(&n) => n - 1,
         ([], [], _) => {
             let there = grid.header.iter().map(|h| format!("'{h}'")).collect::<Vec<_>>().join(", ");
-            return Err(format!("the table has no column '{header}'; it has {there}"));
+            return Err(MapError::NoColumn { header: header.into(), there });
         }
-        _ => return Err(format!("several columns are called '{header}'; name them by number, as in #3")),
+        _ => return Err(MapError::SeveralColumns(header.into())),
     };
     Ok(Taken { index, header: grid.header[index].clone(), target, unit_text, unit, assumed: false })
 }
 
-fn constant(entry: &str) -> Result<Option<Constant>, String> {
-    let (name, text) = entry.split_once('=').ok_or_else(|| format!("--set {entry}: NAME=VALUE is needed"))?;
+fn constant(entry: &str) -> Result<Option<Constant>, MapError> {
+    let (name, text) = entry.split_once('=').ok_or_else(|| MapError::SetEntry(entry.into()))?;
     let (name, text) = (name.trim(), text.trim());
     let (number, unit) = text.split_once(':').map_or((text, None), |(n, u)| (n.trim(), Some(u)));
-    let at =
-        Target::named(name).ok_or_else(|| format!("--set {name}: no such target; there are {}", names()))?;
+    let at = Target::named(name).ok_or_else(|| MapError::SetTarget(name.into()))?;
     let target = &TARGETS[at];
     if at == Id::Time as usize && number == "rows" {
         return Ok(None);
     }
-    let bad = || format!("--set {name}: '{number}' cannot be read");
+    let bad = || MapError::SetValue { name: name.into(), value: number.into() };
     let value = match target.kind {
         Kind::Text => f64::NAN,
         Kind::Way => way(number).ok_or_else(bad)?,
-        Kind::Count => return Err(format!("--set {name}: a count differs from row to row")),
+        Kind::Count => return Err(MapError::SetCount(name.into())),
         Kind::Number(dimension) => {
             // A value without a unit is SI, as the columns of the point table are.
-            let unit_text = unit.unwrap_or(dimension.si());
-            let unit = Unit::parse(dimension, unit_text).ok_or_else(|| {
-                format!("--set {name}: '{unit_text}' is not a unit; there are {}", dimension.known())
-            })?;
-            unit.apply(number).ok_or_else(bad)?
+            let unit = unit.unwrap_or(dimension.si());
+            let unknown = || MapError::SetUnit { name: name.into(), unit: unit.into(), dimension };
+            Unit::parse(dimension, unit).ok_or_else(unknown)?.apply(number).ok_or_else(bad)?
         }
     };
     Ok(Some(Constant { target: at, text: text.to_string(), value }))
@@ -281,8 +306,8 @@ pub fn way(text: &str) -> Option<f64> {
 /// units. `None` where that header has none of them.
 ///
 /// # Errors
-/// In words: a column that is missing there, units that are not stated in both places.
-pub fn under(map: &Map, grid: &Grid, block: &Block) -> Result<Option<Map>, String> {
+/// A column that is missing there, units that are not stated in both places.
+pub fn under(map: &Map, grid: &Grid, block: &Block) -> Result<Option<Map>, MapError> {
     let there = |c: &Taken| block.columns.get(c.index).copied().flatten();
     let here = map.columns.iter().filter(|c| there(c).is_some()).count();
     if here == 0 {
@@ -290,9 +315,9 @@ pub fn under(map: &Map, grid: &Grid, block: &Block) -> Result<Option<Map>, Strin
     }
     let mut own = map.clone();
     for column in &mut own.columns {
-        let place = block.place;
-        let index = there(column)
-            .ok_or_else(|| format!("row {place} is a second header, without a column '{}'", column.header))?;
+        let (row, header) = (block.place, column.header.clone());
+        let missing = || MapError::NotUnder { row, header: header.clone() };
+        let index = there(column).ok_or_else(missing)?;
         let unit_row = |units: &[String], at: usize| units.get(at).filter(|u| !u.is_empty()).cloned();
         let (was, is) = (unit_row(&grid.units, column.index), unit_row(&block.units, index));
         if grid.header[column.index] != block.header[index] || was != is {
@@ -309,12 +334,7 @@ pub fn under(map: &Map, grid: &Grid, block: &Block) -> Result<Option<Map>, Strin
             match (first, second) {
                 (Some((_, first)), Some((_, second))) if first == column.unit => column.unit = second,
                 (Some((_, first)), Some((_, second))) if first == second => {}
-                _ => {
-                    return Err(format!(
-                        "row {place} is a second header, with another unit of '{}' ('{}')",
-                        column.header, block.header[index]
-                    ));
-                }
+                _ => return Err(MapError::OtherUnit { row, header, other: block.header[index].clone() }),
             }
         }
         column.index = index;
