@@ -93,16 +93,11 @@ fn over_instruments(
 
     let lost = Arc::new(AtomicBool::new(false));
     let monitor = StallMonitor::start(origin_ns).into_diagnostic().wrap_err(Unfinished::Internal)?;
+    let ports = job.setup.certificates.applied(Ports::new(rig.force, rig.amplifier, rig.stage));
     let (rig, mut handle, row_out) = WallLoop::start(Parts {
         config: job.setup.config,
         model: Arc::clone(&job.model),
-        ports: Ports::new(
-            job.setup.certificates.calibrated(rig.force),
-            job.setup.certificates.calibrated_amplifier(rig.amplifier),
-            rig.stage,
-        )
-        .with_supply(rig.supply)
-        .with_contacts(rig.contacts),
+        ports: ports.with_supply(rig.supply).with_contacts(rig.contacts),
         links: rig.links,
         pacing: job.setup.file.pace.pacing(),
         origin_ns,

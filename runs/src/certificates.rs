@@ -17,6 +17,7 @@ use models::quantity::PeakToPeak;
 use models::rig_file::Calibration;
 use realtime::ports::{Amplifier, AmplifierState, ForceSensor, Forces, Nanos, NoData, Quality, Reading};
 use realtime::safety::DriveCommand;
+use realtime::turn::Ports;
 use std::path::Path;
 use temperature::TemperatureRange;
 
@@ -137,12 +138,13 @@ impl Certificates {
         Ok(())
     }
 
-    /// The amplifier's port with the certificate applied, or the port itself where there is none.
-    pub fn calibrated_amplifier(&self, amplifier: Box<dyn Amplifier>) -> Box<dyn Amplifier> {
-        match self.amplitude {
-            None => amplifier,
-            Some(calibration) => Box::new(CalibratedAmplifier { inner: amplifier, calibration }),
+    /// A rig's ports, with the certificates applied to force and amplifier.
+    pub fn applied(&self, mut ports: Ports) -> Ports {
+        ports.force = self.calibrated(ports.force);
+        if let Some(calibration) = self.amplitude {
+            ports.amplifier = Box::new(CalibratedAmplifier { inner: ports.amplifier, calibration });
         }
+        ports
     }
 
     /// The force port with the certificate applied, or the port itself where there is none.

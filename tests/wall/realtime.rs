@@ -76,13 +76,12 @@ fn the_loops_thread_allocates_nothing_behind_real_drivers() {
     let _emulators = rig::emulators::embed(&mut instruments, &plant, false).unwrap();
     let opened = drivers::open(&instruments, epoch).unwrap();
     let counted = Arc::new(AtomicU64::new(u64::MAX));
-    let force = setup.certificates.calibrated(opened.force);
-    let force = Box::new(Counted { inner: force, reads: 0, counted: Arc::clone(&counted) });
-    let amplifier = setup.certificates.calibrated_amplifier(opened.amplifier);
+    let mut ports = setup.certificates.applied(Ports::new(opened.force, opened.amplifier, opened.stage));
+    ports.force = Box::new(Counted { inner: ports.force, reads: 0, counted: Arc::clone(&counted) });
     let (rig, mut reins, mut record) = WallLoop::start(Parts {
         config: setup.config,
         model: Arc::new(SpringSlider::new(setup.tip.finger).unwrap()),
-        ports: Ports::new(force, amplifier, opened.stage),
+        ports,
         links: opened.links,
         pacing: realtime::pacing::Pacing::default(),
         origin_ns,

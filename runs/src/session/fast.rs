@@ -68,9 +68,8 @@ pub fn run(
 
 /// What the loop of a job has to do with: the virtual rig, through the setup's certificates.
 fn ports_of(job: &Job, [force, amplifier, stage]: [SharedRig; 3]) -> Ports {
-    let force = job.setup.certificates.calibrated(Box::new(force));
-    let amplifier = job.setup.certificates.calibrated_amplifier(Box::new(amplifier));
-    let mut ports = Ports::new(force, amplifier, Box::new(stage.clone()));
+    let ports = Ports::new(Box::new(force), Box::new(amplifier), Box::new(stage.clone()));
+    let mut ports = job.setup.certificates.applied(ports);
     if job.setup.file.supply_relay.is_some() {
         ports = ports.with_supply(Box::new(stage.clone()));
     }
