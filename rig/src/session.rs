@@ -7,38 +7,29 @@
 mod writer;
 
 use crate::dead_man_key::DeadManKey;
-use crate::exposure::Ledger;
+use crate::emulators::Embedded;
+use crate::exposure::{Keeping, Ledger};
 use crate::rig_lock::RigClaim;
-use crate::wall_loop::{Ended, Parts, WallLoop};
+use crate::wall_loop::{Ended, LoopHandle, Parts, WallLoop};
 use miette::{IntoDiagnostic, WrapErr};
 use realtime::clock::Clock;
-use realtime::pacing;
+use realtime::pacing::{self, Lifeline};
 use realtime::ports::Nanos;
 use realtime::stall_monitor::StallMonitor;
 use realtime::turn::Ports;
-use runs::ambient::{Bench, World};
+use runs::ambient::{Answers, Bench, World};
 use runs::exposure_left::Left;
-use runs::sequence::{Event, MeasuredPass, Outcome};
+use runs::sequence::{Event, MeasuredPass, Outcome, Sequence};
 use runs::session::keeper::{self, Keeper};
-use runs::session::{Begun, Job, Signals, Snapshot, Snapshots, Summary, Unfinished, Update, words};
+use runs::session::{Begun, Job, Signals, Snapshot, Snapshots, Summary, Unfinished, Update};
 use runs::supervisor::{self, End, Requests};
-use std::collections::BTreeMap;
+use sim::wire::SharedPlant;
 use std::panic::AssertUnwindSafe;
 use std::sync::Arc;
 use std::sync::atomic::{AtomicBool, Ordering};
-use std::sync::mpsc::{Receiver, channel};
+use std::sync::mpsc::{Receiver, Sender, channel};
 use std::time::Instant;
-
-/// What the sweep has to keep and to tell.
-struct Note {
-    at: Nanos,
-    events: Vec<Event>,
-    pass: Option<MeasuredPass>,
-    /// Passes made, planned, s to go.
-    progress: (usize, usize, f64),
-    /// The cycle, if it is to be shown.
-    state: Option<Snapshot>,
-}
+use writer::{Entry, Recording};
 
 /// Runs a job: in wall-clock time over its instruments, or in virtual time where the job says so. In wall-clock time `update` must
 /// wait for nothing: whoever keeps the passes calls it.
@@ -60,7 +51,8 @@ pub fn run(job: Job, signals: &Signals, update: &mut dyn FnMut(Update<'_>)) -> m
     over_instruments(job, begun, signals, update)
 }
 
-/// Runs a job in wall-clock time.
+/// Runs a job in wall-clock time: connects, starts loop and recorder, follows the sweep, switches off, ends
+/// the record. What is dropped last comes first: the terminal's key, the lock of the rig, the emulators.
 fn over_instruments(
     mut job: Job,
     begun: Begun,
@@ -78,15 +70,8 @@ fn over_instruments(
     let epoch = Instant::now();
     let simulated = job.setup.file.virtual_rig.is_some();
     let clock = if simulated { Clock::holdable(epoch) } else { Clock::from(epoch) };
-    let origin_ns = pacing::monotonic_ns();
-    let start_unix_ns = keeper::unix_ns();
-    let mut instruments = job.setup.instruments();
-    let embedded = simulated.then(|| embed(&job, &mut instruments, clock.clone())).transpose()?;
-    let air = embedded.as_ref().map(|(_, plant)| World::Served(plant.clone()));
-    let mut bench = Bench::open(&sequence, instruments.chamber.as_ref(), air, answers)?;
-    let rig = drivers::open(&instruments, clock.clone()).map_err(|e| {
-        miette::miette!(help = "check address, wiring and power; 'muprime doctor --setup' says more", "{e}")
-    })?;
+    let (origin_ns, start_unix_ns) = (pacing::monotonic_ns(), keeper::unix_ns());
+    let (_embedded, bench, rig) = connect(&job, &sequence, answers, &clock)?;
     let mut keeper = Keeper::begin(&job, dir, planned)?;
     let file = keeper.new_record()?;
     let preamble = keeper::preamble(&job, start_unix_ns)?;
@@ -94,7 +79,7 @@ fn over_instruments(
     let lost = Arc::new(AtomicBool::new(false));
     let monitor = StallMonitor::start(origin_ns).into_diagnostic().wrap_err(Unfinished::Internal)?;
     let ports = job.setup.certificates.applied(Ports::new(rig.force, rig.amplifier, rig.stage));
-    let (rig, mut handle, row_out) = WallLoop::start(Parts {
+    let (rig, handle, rows) = WallLoop::start(Parts {
         config: job.setup.config,
         model: Arc::clone(&job.model),
         ports: ports.with_supply(rig.supply).with_contacts(rig.contacts),
@@ -103,90 +88,36 @@ fn over_instruments(
         origin_ns,
     })
     .wrap_err(Unfinished::Internal)?;
-    let keeping = match ledger {
-        None => None,
-        Some(ledger) => Some(ledger.keep(rig.life(), handle.stopper()).into_diagnostic()?),
-    };
+    let keeping = ledger.map(|ledger| ledger.keep(rig.life(), handle.stopper()));
+    let keeping = keeping.transpose().into_diagnostic()?;
     let held = key.map(|key| key.hold(handle.sender())).transpose().into_diagnostic()?;
-    let (to_writer, notes) = channel();
-    let (last_in, last_out) = channel();
-    let writing = {
-        let lost = RaisedByPanic(Arc::clone(&lost));
-        let clock = clock.join(writer::SLACK);
-        let write = move || writer::write(file, preamble, row_out, &notes, &last_out, &lost.0, &clock);
-        std::thread::Builder::new().name("recorder".into()).spawn(write).into_diagnostic()?
-    };
+    let recording = Recording::start(file, preamble, rows, &lost, &clock)?;
 
-    let (note_in, note_out) = channel::<Note>();
+    let (note_in, notes) = channel();
     let mut unkept = None;
-    let (life, period) = (rig.life(), job.setup.config.limits.timing.cycle);
+    let mut keep = |news: &mut dyn FnMut(Update<'_>)| {
+        pass_on(&notes, &mut keeper, &lost, &recording.entries, &mut unkept, news);
+    };
+    let mut snapshots = Snapshots::of(start_unix_ns, job.setup.config.limits.timing.cycle);
+    let (life, stop, session) = (rig.life(), handle.stopper(), tracing::Span::current());
+    let (following_sequence, asks) = (&mut sequence, asks(signals, &lost, keeping.as_ref()));
     let (outcome, panicked) = std::thread::scope(|scope| {
-        let (following_sequence, lost, stop) = (&mut sequence, &*lost, handle.stopper());
-        let keeping = keeping.as_ref();
-        let session = tracing::Span::current();
         let following = scope.spawn(move || {
             let _session = session.enter();
-            let (mut stops, mut knows) = (0, false);
-            let mut ends = || {
-                let requested = signals.stops.load(Ordering::Relaxed);
-                if requested > stops {
-                    stops = requested;
-                    return Some(End::Requested);
-                }
-                let unkept = keeping.is_some_and(|keeping| !keeping.holds());
-                let end = match lost.load(Ordering::Relaxed) {
-                    true => Some(End::NotKept),
-                    false => unkept.then_some(End::ExposureNotKept),
-                };
-                let end = end.filter(|_| !knows);
-                knows |= end.is_some();
-                end
-            };
-            let mut ask = || Requests { end: ends(), pause: signals.paused.load(Ordering::Relaxed) };
-            let mut snapshots = Snapshots::of(start_unix_ns, period);
-            supervisor::sweep(&mut handle, following_sequence, &mut ask, &mut |row, sequence, reaction| {
-                bench.serve(row.now, sequence, &reaction);
-                let state =
-                    snapshots.take(row).map(|state| Snapshot { driven: Some(life.driven()), ..state });
-                if state.is_some() || !reaction.events.is_empty() || reaction.pass.is_some() {
-                    let (done, all) = sequence.progress();
-                    let progress = (done, all, sequence.remaining_s());
-                    let (events, pass) = (reaction.events, reaction.pass);
-                    // The other end lives as long as this one: it reads until this end is dropped.
-                    let _ = note_in.send(Note { at: row.now, events, pass, progress, state });
-                }
-            })
+            follow(note_in, &life, &mut snapshots, asks, bench, following_sequence, handle)
         });
-        let mut keep = |notes: &Receiver<Note>, news: &mut dyn FnMut(Update<'_>)| {
-            for note in notes {
-                // Passes that come until the sweep has stopped are stored if possible.
-                if let Err(why) = keeper.keep(&note.events, note.pass.as_ref(), news) {
-                    lost.store(true, Ordering::Relaxed);
-                    unkept.get_or_insert(why);
-                }
-                if note.pass.is_some() {
-                    let (done, all, left_s) = note.progress;
-                    news(Update::Progress(done, all, left_s));
-                }
-                if let Some(snapshot) = &note.state {
-                    news(Update::State(snapshot));
-                }
-                if note.pass.is_some() || !note.events.is_empty() {
-                    let _ = to_writer.send((note.at, note.events, note.pass));
-                }
-            }
-        };
         // The receiver of the updates is foreign code, and may panic where its terminal is gone. Then the rig
         // is stopped before anything else, the measurements are stored, and the panic continues with the rig
         // off.
-        let finished = std::panic::catch_unwind(AssertUnwindSafe(|| keep(&note_out, news)));
+        let finished = std::panic::catch_unwind(AssertUnwindSafe(|| keep(news)));
         if finished.is_err() {
             stop();
             lost.store(true, Ordering::Relaxed);
-            keep(&note_out, &mut |_| {});
+            keep(&mut |_| {});
         }
-        (following.join(), finished.err())
+        (following.join().map_err(|_| fault("the sweep's thread panicked")), finished.err())
     });
+
     // Whatever ended it: off first.
     let Ended { report, links, off } = rig.end();
     let said_off = std::panic::catch_unwind(AssertUnwindSafe(|| news(Update::Off(&off))));
@@ -196,21 +127,16 @@ fn over_instruments(
         keeping.end(off.read_back);
     }
     let stalls = monitor.finish();
-    let held = clock.held_back();
-    drop(to_writer);
-    let outcome = outcome.map_err(|_| fault("the sweep's thread panicked"));
-    let mut last = BTreeMap::new();
-    if let Ok(outcome) = &outcome {
-        last.insert("outcome".to_string(), words(outcome)?);
-    }
-    last.insert("loop".to_string(), serde_json::to_string(&report).into_diagnostic()?);
-    last.insert("stalls".to_string(), serde_json::to_string(&stalls).into_diagnostic()?);
-    last.insert("links".to_string(), serde_json::to_string(&links).into_diagnostic()?);
-    last.insert("off".to_string(), serde_json::to_string(&off).into_diagnostic()?);
-    let _ = last_in.send(last);
-    // A writer that cannot write waits for the other end of this channel to go.
-    drop(last_in);
-    let written = writing.join().map_err(|_| fault("the recorder's thread panicked"));
+    let held_back = clock.held_back();
+    let last = [
+        ("loop", serde_json::to_string(&report)),
+        ("stalls", serde_json::to_string(&stalls)),
+        ("links", serde_json::to_string(&links)),
+        ("off", serde_json::to_string(&off)),
+    ];
+    let ended = outcome.iter().map(|outcome| ("outcome", serde_json::to_string(outcome)));
+    let last = ended.chain(last).map(|(name, text)| Ok((name.to_string(), text.into_diagnostic()?)));
+    let written = recording.end(last.collect::<miette::Result<_>>()?);
     if let Some(panic) = panicked {
         tracing::error!("{}", off.words());
         std::panic::resume_unwind(panic);
@@ -234,15 +160,107 @@ fn over_instruments(
     let outcome = if unrecorded { Outcome::RecordLost } else { outcome };
     let record_lost = written.lost_rows + report.ring_drops;
     let agreement = sequence.agreement(outcome == Outcome::Complete);
-    Ok(keeper.end(outcome, agreement, Some((report, stalls, held)), record_lost, links, off))
+    Ok(keeper.end(outcome, agreement, Some((report, stalls, held_back)), record_lost, links, off))
 }
 
-/// Raises a flag where the thread that holds it panics.
-struct RaisedByPanic(Arc<AtomicBool>);
+/// A virtual rig's instruments as they are served, what is beside the rig, and its ports.
+type Connected = (Option<(Embedded, SharedPlant)>, Bench, drivers::Rig);
 
-impl Drop for RaisedByPanic {
-    fn drop(&mut self) {
-        self.0.fetch_or(std::thread::panicking(), Ordering::Relaxed);
+/// Serves the virtual rig where the setup has one, and opens the instruments.
+fn connect(job: &Job, sequence: &Sequence, answers: Answers, clock: &Clock) -> miette::Result<Connected> {
+    let mut instruments = job.setup.instruments();
+    let simulated = job.setup.file.virtual_rig.is_some();
+    let embedded = simulated.then(|| embed(job, &mut instruments, clock.clone())).transpose()?;
+    let air = embedded.as_ref().map(|(_, plant)| World::Served(plant.clone()));
+    let bench = Bench::open(sequence, instruments.chamber.as_ref(), air, answers)?;
+    let rig = drivers::open(&instruments, clock.clone()).map_err(|e| {
+        miette::miette!(help = "check address, wiring and power; 'muprime doctor --setup' says more", "{e}")
+    })?;
+    Ok((embedded, bench, rig))
+}
+
+/// What the sweep has to keep and to tell.
+struct Note {
+    at: Nanos,
+    events: Vec<Event>,
+    pass: Option<MeasuredPass>,
+    /// Passes made, planned, s to go.
+    progress: (usize, usize, f64),
+    /// The cycle, if it is to be shown.
+    state: Option<Snapshot>,
+}
+
+/// The requests to the sweep. A request to stop counts once; so does the loss of the record or the ledger.
+fn asks(signals: &Signals, lost: &AtomicBool, keeping: Option<&Keeping>) -> impl FnMut() -> Requests {
+    let (mut stops, mut knows) = (0, false);
+    let mut ends = move || {
+        let requested = signals.stops.load(Ordering::Relaxed);
+        if requested > stops {
+            stops = requested;
+            return Some(End::Requested);
+        }
+        let unkept = keeping.is_some_and(|keeping| !keeping.holds());
+        let end = match lost.load(Ordering::Relaxed) {
+            true => Some(End::NotKept),
+            false => unkept.then_some(End::ExposureNotKept),
+        };
+        let end = end.filter(|_| !knows);
+        knows |= end.is_some();
+        end
+    };
+    move || Requests { end: ends(), pause: signals.paused.load(Ordering::Relaxed) }
+}
+
+/// Answers the loop's rows until the sweep ends. The last argument is dropped first: the notes end after loop
+/// and bench.
+fn follow(
+    notes: Sender<Note>,
+    life: &Lifeline,
+    snapshots: &mut Snapshots,
+    mut asks: impl FnMut() -> Requests,
+    mut bench: Bench,
+    sequence: &mut Sequence,
+    mut handle: LoopHandle,
+) -> Outcome {
+    supervisor::sweep(&mut handle, sequence, &mut asks, &mut |row, sequence, reaction| {
+        bench.serve(row.now, sequence, &reaction);
+        let state = snapshots.take(row).map(|state| Snapshot { driven: Some(life.driven()), ..state });
+        if state.is_some() || !reaction.events.is_empty() || reaction.pass.is_some() {
+            let (done, all) = sequence.progress();
+            let progress = (done, all, sequence.remaining_s());
+            let (events, pass) = (reaction.events, reaction.pass);
+            // The other end lives as long as this one: it reads until this end is dropped.
+            let _ = notes.send(Note { at: row.now, events, pass, progress, state });
+        }
+    })
+}
+
+/// Passes notes on until the sweep ends: to the disk, to whoever watches, and into the record. `unkept` takes
+/// why the first pass that could not be stored was not.
+fn pass_on(
+    notes: &Receiver<Note>,
+    keeper: &mut Keeper,
+    lost: &AtomicBool,
+    entries: &Sender<Entry>,
+    unkept: &mut Option<miette::Report>,
+    news: &mut dyn FnMut(Update<'_>),
+) {
+    for note in notes {
+        // Passes that come until the sweep has stopped are stored if possible.
+        if let Err(why) = keeper.keep(&note.events, note.pass.as_ref(), news) {
+            lost.store(true, Ordering::Relaxed);
+            unkept.get_or_insert(why);
+        }
+        if note.pass.is_some() {
+            let (done, all, left_s) = note.progress;
+            news(Update::Progress(done, all, left_s));
+        }
+        if let Some(snapshot) = &note.state {
+            news(Update::State(snapshot));
+        }
+        if note.pass.is_some() || !note.events.is_empty() {
+            let _ = entries.send((note.at, note.events, note.pass));
+        }
     }
 }
 
@@ -256,8 +274,8 @@ fn embed(
     job: &Job,
     instruments: &mut drivers::InstrumentsSetup,
     clock: Clock,
-) -> miette::Result<(crate::emulators::Embedded, sim::wire::SharedPlant)> {
-    let plant = sim::wire::SharedPlant::new(sim::wire::world::WorldPlant::new(job.world()?), clock);
+) -> miette::Result<(Embedded, SharedPlant)> {
+    let plant = SharedPlant::new(sim::wire::world::WorldPlant::new(job.world()?), clock);
     let embedded = crate::emulators::embed(instruments, &plant, false);
     Ok((embedded.map_err(|problem| miette::miette!("{problem}"))?, plant))
 }

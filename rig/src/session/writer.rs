@@ -1,24 +1,28 @@
 //! The record's thread: drains the ring, writes, flushes, syncs.
 
+use super::fault;
 use miette::IntoDiagnostic;
-use realtime::clock::Participant;
+use realtime::clock::{Clock, Participant};
 use realtime::ports::Nanos;
 use realtime::recorder::{Preamble, Recorder};
 use realtime::turn::Row;
+use ringbuf::HeapCons;
 use ringbuf::traits::Consumer;
 use runs::files::Placed;
 use runs::sequence::{Event, MeasuredPass};
 use runs::session::keeper;
 use std::collections::BTreeMap;
+use std::sync::Arc;
 use std::sync::atomic::{AtomicBool, Ordering};
-use std::sync::mpsc::{Receiver, RecvTimeoutError};
+use std::sync::mpsc::{Receiver, RecvTimeoutError, Sender, channel};
+use std::thread::JoinHandle;
 use std::time::{Duration, Instant};
 
 const FLUSH_EVERY: Duration = Duration::from_millis(50);
 /// Sync of the record to the disk.
 const SYNC_EVERY: Duration = Duration::from_secs(1);
 /// How far a held clock may pass what is written: a small part of the ring.
-pub(super) const SLACK: Nanos = Nanos(1_000_000_000);
+const SLACK: Nanos = Nanos(1_000_000_000);
 
 /// Events and passes for the record, with their time.
 pub(super) type Entry = (Nanos, Vec<Event>, Option<MeasuredPass>);
@@ -34,9 +38,53 @@ pub(super) struct Written {
     pub problem: Option<String>,
 }
 
+/// The record's thread, and the channels into it.
+pub(super) struct Recording {
+    pub entries: Sender<Entry>,
+    last: Sender<Last>,
+    thread: JoinHandle<Written>,
+}
+
+impl Recording {
+    /// Starts the thread, which raises `lost` where the record cannot be written.
+    pub fn start(
+        file: Placed,
+        preamble: Preamble,
+        rows: HeapCons<Row>,
+        lost: &Arc<AtomicBool>,
+        clock: &Clock,
+    ) -> miette::Result<Self> {
+        let (entries, entries_out) = channel();
+        let (last, last_out) = channel();
+        let lost = RaisedByPanic(Arc::clone(lost));
+        let clock = clock.join(SLACK);
+        let write = move || write(file, preamble, rows, &entries_out, &last_out, &lost.0, &clock);
+        let thread = std::thread::Builder::new().name("recorder".into()).spawn(write).into_diagnostic()?;
+        Ok(Recording { entries, last, thread })
+    }
+
+    /// Hands the last words over, and waits until they are written.
+    pub fn end(self, last: Last) -> miette::Result<Written> {
+        drop(self.entries);
+        let _ = self.last.send(last);
+        // A writer that cannot write waits for the other end of this channel to go.
+        drop(self.last);
+        self.thread.join().map_err(|_| fault("the recorder's thread panicked"))
+    }
+}
+
+/// Raises a flag where the thread that holds it panics.
+struct RaisedByPanic(Arc<AtomicBool>);
+
+impl Drop for RaisedByPanic {
+    fn drop(&mut self) {
+        self.0.fetch_or(std::thread::panicking(), Ordering::Relaxed);
+    }
+}
+
 /// Writes until the last words come. A file that cannot be written, or that was removed, raises `lost`, and the rest is counted:
 /// the rows go on being drained, so that the loop never notices. It ends with the last words, whatever becomes of the file.
-pub(super) fn write(
+fn write(
     file: Placed,
     preamble: Preamble,
     mut rows: impl Consumer<Item = Row>,
@@ -111,9 +159,7 @@ fn record(
 #[cfg(test)]
 mod tests {
     use super::*;
-    use realtime::clock::Clock;
     use ringbuf::traits::Split;
-    use std::sync::mpsc::channel;
 
     /// A record that takes everything and cannot be ended: its index is made from what is read back, and it cannot be read.
     #[test]
