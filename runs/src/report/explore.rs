@@ -4,6 +4,7 @@
 use super::RunData;
 use super::events::describe;
 use super::traces::Trace;
+use crate::session::{REPLAYABLE, Replayable};
 use models::quantity::PeakToPeak;
 
 /// The figures of the dashboard and of a run's page, a module.
@@ -71,13 +72,10 @@ fn data(run: &RunData, traces: &[Trace]) -> serde_json::Value {
         .iter()
         .filter_map(|(at_s, event)| Some((at_s, describe(&serde_json::from_value(event.clone()).ok()?))))
         .collect();
-    let limits =
-        run.files.get("setup.toml").and_then(|text| std::str::from_utf8(text).ok()).and_then(|text| {
-            // The limits that the run had are in its own setup; without its certificates' files that cannot always be read again.
-            crate::setup::Setup::parse("setup.toml", text, std::path::Path::new(".")).ok()
-        });
-    let limits = limits.map(|setup| {
-        let limits = &setup.config.limits;
+    // The limits that the run had. The setup's own need its certificates, which may be elsewhere by now.
+    let replayed = run.files.get(REPLAYABLE).and_then(|text| serde_json::from_slice::<Replayable>(text).ok());
+    let limits = replayed.map(|replayed| {
+        let limits = &replayed.config.limits;
         serde_json::json!({ "lateral_n": limits.lateral_force_max_n, "normal_n": limits.normal_force_max_n })
     });
     serde_json::json!({ "passes": passes, "traces": traces, "events": events, "limits": limits })
@@ -90,10 +88,39 @@ fn short(value: Option<f64>) -> Option<f64> {
 
 #[cfg(test)]
 mod tests {
+    use super::*;
+    use crate::setup::Setup;
+    use std::collections::BTreeMap;
+
     /// Without the library's style its figures lie over what follows them.
     #[test]
     fn the_script_comes_with_the_librarys_style() {
-        let page = super::script("start();");
+        let page = script("start();");
         assert!(page.find(".uplot").is_some_and(|style| style < page.find("<script>").unwrap()));
+    }
+
+    /// A run's folder that was copied has no files of certificates beside it.
+    #[test]
+    fn a_page_shows_the_limits_of_a_run_whose_certificates_are_elsewhere() {
+        let setup = Setup::load("virtual").unwrap();
+        let (config, finger) = (setup.config, setup.tip.finger);
+        let replayed = Replayable { config, finger, law: None, lateral_passband_hz: None };
+        let moved = format!("certificates = [\"elsewhere.toml\"]\n{}", setup.text);
+        let files =
+            [("setup.toml", moved.into_bytes()), (REPLAYABLE, serde_json::to_vec_pretty(&replayed).unwrap())];
+        let run = RunData {
+            about: Vec::new(),
+            facts: BTreeMap::new(),
+            files: files.map(|(name, text)| (name.to_string(), text)).into(),
+            passes: Vec::new(),
+            events: Vec::new(),
+            summary: None,
+            finger,
+            fidelity: None,
+            damage: Vec::new(),
+        };
+        let limits = &data(&run, &[])["limits"];
+        assert_eq!(limits["lateral_n"], config.limits.lateral_force_max_n);
+        assert_eq!(limits["normal_n"], config.limits.normal_force_max_n);
     }
 }
