@@ -1,19 +1,17 @@
 //! The diagnosis of a table.
 
 use crate::{MuprimeError, refused};
-use calibration::certificate::sha256_hex;
 use diagnosis::data::Table;
 use diagnosis::document::{document, predictions};
 use diagnosis::hypotheses::Options;
-use diagnosis::law::Law;
 use miette::{Context, IntoDiagnostic};
 use models::pass::read_passes;
 use pyo3::prelude::*;
-use runs::verdict::words;
+use runs::verdict::{corrected_model, words};
 use std::path::Path;
-use std::sync::Arc;
 use tables::law::{for_finger, of_text};
 use tables::passes::parse_passes;
+use tables::verdict::Subject;
 
 /// A diagnosis: the document of `muprime diagnose --json`, text, page, requested predictions as CSV, and the
 /// corrected model as TOML.
@@ -66,35 +64,23 @@ fn texts(
 ) -> miette::Result<Texts> {
     let rig = runs::input::rig_text(rig_name, rig)?;
     let passes = parse_passes(Path::new(name), bytes)?;
-    let mut table = Table::measured(&passes).into_diagnostic().wrap_err_with(|| name.to_string())?;
-    let mut law = None;
+    let mut subject = Subject::of(passes, bytes, rig).into_diagnostic().wrap_err_with(|| name.to_string())?;
     if let Some((what, text)) = model {
-        let loaded = match text {
-            Some(text) => of_text(&what, what.clone(), text, &rig.finger)?,
-            None => for_finger(Path::new(&what), &rig.finger)?,
+        let base = match text {
+            Some(text) => of_text(&what, what.clone(), text, &subject.rig.finger)?,
+            None => for_finger(Path::new(&what), &subject.rig.finger)?,
         };
-        let (base, within) =
-            Law::on(loaded.model, loaded.file.map(|f| f.1), &table).into_diagnostic().wrap_err(what)?;
-        (law, table) = (Some(Arc::new(base)), within);
+        subject = subject.on(base).into_diagnostic().wrap_err(what)?;
     }
-    let conditions = match predict {
-        None => None,
-        Some(bytes) => {
-            let rows = read_passes(&bytes[..]).into_diagnostic().wrap_err("conditions to predict")?;
-            let origin = table.origin(&passes);
-            Some(Table::conditions(&rows, &origin).into_diagnostic().wrap_err("conditions to predict")?)
-        }
-    };
-    let options = Options { law, ..choice };
-    let mut result = diagnosis::verdict::diagnose(&table, &rig, &options, sha256_hex(bytes));
-    if let Some(run) = run {
-        runs::verdict::add_record(&mut result, run, &rig)?;
-    }
-    let about =
-        [vec![("table", name.to_string()), ("rig", rig_name.to_string())], runs::report::about::of_rig(&rig)]
-            .concat();
-    let page = runs::report::diagnosis::page(&result, &table, &about)?;
+    let conditions = predict.map(|bytes| {
+        let (rows, origin) =
+            (read_passes(&bytes[..]).into_diagnostic()?, subject.table.origin(&subject.passes));
+        Table::conditions(&rows, &origin).into_diagnostic()
+    });
+    let conditions = conditions.transpose().wrap_err("conditions to predict")?;
+    let result = subject.diagnose(choice, run)?;
+    let page = subject.page_of_table(&result, name, rig_name)?;
     let predicted = conditions.as_ref().map(|conditions| predictions(&result, conditions));
-    let model = result.saved_model().map(|model| toml::to_string(&model)).transpose().into_diagnostic()?;
-    Ok((document(&result, &rig, damage).into_diagnostic()?, words(&result, &rig), page, predicted, model))
+    let (model, rig) = (corrected_model(&result)?, &subject.rig);
+    Ok((document(&result, rig, damage).into_diagnostic()?, words(&result, rig), page, predicted, model))
 }

@@ -7,6 +7,7 @@ use crate::report::human::{quantity, with_interval};
 use diagnosis::certificates;
 use diagnosis::intervals::{Estimate, Shape};
 use diagnosis::verdict::{Diagnosis, Hypothesis, probability};
+use miette::IntoDiagnostic;
 use models::condition::Condition;
 use models::covariate::{self, Covariate};
 use models::rig_file::RigFile;
@@ -40,6 +41,14 @@ pub fn words(result: &Diagnosis, rig: &RigFile) -> String {
         text.push('\n');
     }
     text
+}
+
+/// The corrected model as TOML; none where no effect of the library explains most of the gap.
+///
+/// # Errors
+/// A model that TOML cannot hold.
+pub fn corrected_model(result: &Diagnosis) -> miette::Result<Option<String>> {
+    result.saved_model().map(|model| toml::to_string(&model)).transpose().into_diagnostic()
 }
 
 /// The plan of the experiment that tells most; none where no conditions would tell more.

@@ -7,6 +7,7 @@
 //! | [`law`] | a friction law by name or from a file; a law that was tabulated |
 //! | [`passes`] | a point table from its bytes, CSV or Parquet |
 //! | [`schemas`] | schemas from the types, the reference of all keys, commented beginnings, what is bundled |
+//! | [`verdict`] | the verdict on a table or a run, from its files to those that it is written into |
 //! | [`check`] | what is wrong with any file, and whether a plan can run on a setup |
 
 #![deny(clippy::print_stdout, clippy::print_stderr)]
@@ -17,6 +18,7 @@ pub mod import;
 pub mod law;
 pub mod passes;
 pub mod schemas;
+pub mod verdict;
 
 /// The answer of a build without a feature. `instead`: what serves in its place.
 pub fn built_without(feature: &str, instead: &str) -> miette::Report {

@@ -1,25 +1,23 @@
 //! `muprime diagnose`: where the gap lies, which effect causes it, how far it shrinks.
 
-use calibration::certificate::sha256_hex;
 use clap::Args as ClapArgs;
 use diagnosis::data::Table;
 use diagnosis::document::{document, predictions};
 use diagnosis::hypotheses::Options;
-use diagnosis::law::Law;
 use diagnosis::progress::{Progress, Stage};
-use diagnosis::verdict::diagnose;
+use diagnosis::verdict::Diagnosis;
 use indicatif::ProgressBar;
 use miette::{Context, IntoDiagnostic};
-use models::pass::Pass;
 use runs::input::{MAX_TABLE_BYTES, bytes_of};
 use runs::print::{self, folded};
-use runs::report::about;
+use runs::verdict::files;
 use runs::{out, say};
 use serde_json::json;
 use std::path::{Path, PathBuf};
 use std::process::ExitCode;
 use std::sync::{Arc, Mutex, PoisonError};
 use tables::passes::parse_passes;
+use tables::verdict::{self, Subject};
 
 /// Parts of the operating space that are printed, the largest first.
 const PRINTED: usize = 6;
@@ -66,88 +64,104 @@ pub struct Args {
     pub without: Vec<String>,
 }
 
+/// The files that a diagnosis is of.
+struct Inputs<'a> {
+    table: PathBuf,
+    rig: PathBuf,
+    /// The folder, where a run is diagnosed.
+    run: Option<&'a Path>,
+}
+
 /// Reads, diagnoses, writes the requested files.
 ///
 /// # Errors
 /// Files that cannot be read or written, tables and rigs that are refused; nothing is written then.
 pub fn run(args: Args, json: bool) -> miette::Result<ExitCode> {
     super::there(&args.data, "run or table")?;
-    let (table_path, beside) = if args.data.is_dir() {
-        (args.data.join("points.csv"), args.data.join("rig.toml"))
-    } else {
-        let folder = args.data.parent().unwrap_or(Path::new("."));
-        (args.data.clone(), folder.join("rig.toml"))
-    };
-    if args.in_folder && !args.data.is_dir() {
+    let run = args.data.is_dir().then_some(&*args.data);
+    let (table, rig) = verdict::inputs(&args.data, args.rig.clone());
+    let inputs = Inputs { table, rig, run };
+    if args.in_folder && run.is_none() {
         miette::bail!(help = "give the folder of a run", "--in-folder: {} is a table", args.data.display());
     }
-    let rig_path = args.rig.as_deref().unwrap_or(&beside);
-    let rig = runs::input::rig_file(rig_path).wrap_err_with(|| {
-        format!("{}: noise and stiffnesses of the rig (--rig names the file)", rig_path.display())
-    })?;
-    let damage = if args.data.is_dir() { runs::run_dir::damage_in(&args.data)? } else { Vec::new() };
-    let bytes = bytes_of(&table_path, MAX_TABLE_BYTES)
-        .wrap_err_with(|| format!("cannot read the table {}", table_path.display()))?;
-    let passes = parse_passes(&table_path, &bytes)?;
-    let shown = || table_path.display().to_string();
-    let rendered = args.data.join(runs::fidelity::FILE).is_file();
-    let whole = Table::measured(&passes).map_err(|why| {
-        let help = "passes that render have no steady friction: diagnose a sweep of the same rig, and give its \
-                    corrected model to the rendering";
-        if rendered { miette::miette!(help = help, "{why}") } else { miette::Report::msg(why) }
-    });
-    let whole = whole.wrap_err_with(shown)?;
-    let (law, table) = match &args.model {
-        None => (None, whole),
-        Some(what) => {
-            let loaded = tables::law::for_finger(what, &rig.finger)?;
-            let text = loaded.file.map(|(_, text)| text);
-            let (law, table) = Law::on(loaded.model, text, &whole).into_diagnostic().wrap_err_with(shown)?;
-            (Some(Arc::new(law)), table)
-        }
-    };
-    if !args.data.is_dir() && !json {
-        tables::import::remarks_of(&passes)
-            .iter()
-            .for_each(|r| say!("{}", folded(&format!("warning: {r}"), 4)));
+    let (subject, damage) = read(&inputs, args.model.as_deref())?;
+    if run.is_none() && !json {
+        let remarks = tables::import::remarks_of(&subject.passes);
+        remarks.iter().for_each(|r| say!("{}", folded(&format!("warning: {r}"), 4)));
     }
-    for name in &args.without {
-        if effects::by_name(name).is_none() {
-            miette::bail!("--without {name}: no such effect; `muprime model effects` lists them");
-        }
-    }
-    let own = tables::law::own_effects(&args.effect)?;
-    let conditions = match &args.predict {
-        Some(path) => {
-            let rows = read_table(path)?;
-            let origin = table.origin(&passes);
-            Some(
-                Table::conditions(&rows, &origin)
-                    .into_diagnostic()
-                    .wrap_err_with(|| path.display().to_string())?,
-            )
-        }
-        None => None,
-    };
+    let options = options(&args)?;
+    let conditions = args.predict.as_ref().map(|path| conditions(path, &subject)).transpose()?;
     // Before the work, not after it.
     for out in [&args.predictions, &args.save_model, &args.report, &args.save_plan].into_iter().flatten() {
         runs::files::replaceable(out, b"point,")?;
     }
     let bar = studies::progress::bar(1000, "per mille");
     let progress = follow(&bar, json)?;
-    let (pairs, without) = (!args.no_pairs, args.without.clone());
-    let options = Options { pairs, without, own, progress, law, ..Options::default() };
-    let mut result = diagnose(&table, &rig, &options, sha256_hex(&bytes));
-    if args.data.is_dir() {
-        runs::verdict::add_record(&mut result, &args.data, &rig)?;
-    }
+    let result = subject.diagnose(Options { progress, ..options }, run)?;
     bar.finish_and_clear();
     if let (Some(conditions), Some(out)) = (&conditions, &args.predictions) {
         write_text(out, &predictions(&result, conditions))?;
     }
+    save_next(&args, &result)?;
+    if args.report.is_some() || args.in_folder {
+        write_page(&args, &inputs, &subject, &result, &damage)?;
+    }
+    if json {
+        out!("{}", document(&result, &subject.rig, &damage).into_diagnostic()?);
+    } else {
+        damage.iter().for_each(|d| say!("{}", folded(&format!("damaged: {d}"), 4)));
+        out!("{}", folded(runs::verdict::words(&result, &subject.rig).trim_end(), 4));
+    }
+    Ok(ExitCode::SUCCESS)
+}
+
+/// The table on its base law, with the rig's calibration; and what is damaged in a run's folder.
+fn read(inputs: &Inputs<'_>, model: Option<&Path>) -> miette::Result<(Subject, Vec<String>)> {
+    let Inputs { table, rig, run } = inputs;
+    let rig = runs::input::rig_file(rig).wrap_err_with(|| {
+        format!("{}: noise and stiffnesses of the rig (--rig names the file)", rig.display())
+    })?;
+    let damage = run.map_or(Ok(Vec::new()), runs::run_dir::damage_in)?;
+    let bytes = bytes_of(table, MAX_TABLE_BYTES)
+        .wrap_err_with(|| format!("cannot read the table {}", table.display()))?;
+    let passes = parse_passes(table, &bytes)?;
+    let shown = || table.display().to_string();
+    let rendered = run.is_some_and(|run| run.join(runs::fidelity::FILE).is_file());
+    let whole = Subject::of(passes, &bytes, rig).map_err(|why| {
+        let help = "passes that render have no steady friction: diagnose a sweep of the same rig, and give its \
+                    corrected model to the rendering";
+        if rendered { miette::miette!(help = help, "{why}") } else { miette::Report::msg(why) }
+    });
+    let whole = whole.wrap_err_with(shown)?;
+    let Some(what) = model else { return Ok((whole, damage)) };
+    let base = tables::law::for_finger(what, &whole.rig.finger)?;
+    Ok((whole.on(base).into_diagnostic().wrap_err_with(shown)?, damage))
+}
+
+/// What is tried, as the arguments say.
+fn options(args: &Args) -> miette::Result<Options> {
+    for name in &args.without {
+        if effects::by_name(name).is_none() {
+            miette::bail!("--without {name}: no such effect; `muprime model effects` lists them");
+        }
+    }
+    let own = tables::law::own_effects(&args.effect)?;
+    Ok(Options { pairs: !args.no_pairs, without: args.without.clone(), own, ..Options::default() })
+}
+
+/// The conditions to predict.
+fn conditions(path: &Path, subject: &Subject) -> miette::Result<Table> {
+    let bytes =
+        bytes_of(path, MAX_TABLE_BYTES).wrap_err_with(|| format!("cannot read {}", path.display()))?;
+    let (rows, origin) = (parse_passes(path, &bytes)?, subject.table.origin(&subject.passes));
+    Table::conditions(&rows, &origin).into_diagnostic().wrap_err_with(|| path.display().to_string())
+}
+
+/// Writes the corrected model and the next plan where they are requested and the verdict has them.
+fn save_next(args: &Args, result: &Diagnosis) -> miette::Result<()> {
     if let Some(out) = &args.save_model {
-        match result.saved_model() {
-            Some(model) => write_text(out, &toml::to_string(&model).into_diagnostic()?)?,
+        match runs::verdict::corrected_model(result)? {
+            Some(model) => write_text(out, &model)?,
             None => {
                 say!(
                     "no model written to {}: no effect of the library explains most of the gap",
@@ -157,52 +171,50 @@ pub fn run(args: Args, json: bool) -> miette::Result<ExitCode> {
         }
     }
     if let Some(out) = &args.save_plan {
-        match runs::verdict::next_plan(&result) {
+        match runs::verdict::next_plan(result) {
             Some(plan) => write_text(out, &plan)?,
             None => say!("no plan written to {}: no conditions would tell more", out.display()),
         }
     }
-    if args.report.is_some() || args.in_folder {
-        let about = if args.data.is_dir() {
-            about::of_run(
-                &args.data,
-                &runs::run_dir::record_facts(&args.data).unwrap_or_default(),
-                Some(&rig),
-            )
-        } else {
-            let named =
-                vec![("table", table_path.display().to_string()), ("rig", rig_path.display().to_string())];
-            [named, about::of_rig(&rig)].concat()
-        };
-        let page = runs::report::diagnosis::page(&result, &table, &about)?;
-        if args.in_folder {
-            runs::verdict::files::write(&args.data, &result, &rig, &page, &damage)?;
-            say!("verdict: {}", args.data.join(runs::verdict::files::PAGE).display());
+    Ok(())
+}
+
+/// Writes the page, into the run's folder with all that belongs to it or where it is requested.
+fn write_page(
+    args: &Args,
+    inputs: &Inputs<'_>,
+    subject: &Subject,
+    result: &Diagnosis,
+    damage: &[String],
+) -> miette::Result<()> {
+    let page = match inputs.run {
+        Some(run) => subject.page_of_run(result, run)?,
+        None => {
+            let [table, rig] = [&inputs.table, &inputs.rig].map(|path| path.display().to_string());
+            subject.page_of_table(result, &table, &rig)?
         }
-        if let Some(out) = &args.report {
-            write_text(out, &page)?;
-            say!("report: {}", out.display());
-            // The run that this is the table of.
-            let run = table_path.parent().filter(|run| run.join("passes.jsonl").exists());
-            if let Some(run) = run.filter(|_| !args.in_folder) {
-                keep_in_run(run, out, &page);
-            }
+    };
+    if args.in_folder {
+        files::write(&args.data, result, &subject.rig, &page, damage)?;
+        say!("verdict: {}", args.data.join(files::PAGE).display());
+    }
+    if let Some(out) = &args.report {
+        write_text(out, &page)?;
+        say!("report: {}", out.display());
+        // The run that this is the table of.
+        let run = inputs.table.parent().filter(|run| run.join("passes.jsonl").exists());
+        if let Some(run) = run.filter(|_| !args.in_folder) {
+            keep_in_run(run, out, &page);
         }
     }
-    if json {
-        out!("{}", document(&result, &rig, &damage).into_diagnostic()?);
-    } else {
-        damage.iter().for_each(|d| say!("{}", folded(&format!("damaged: {d}"), 4)));
-        out!("{}", folded(runs::verdict::words(&result, &rig).trim_end(), 4));
-    }
-    Ok(ExitCode::SUCCESS)
+    Ok(())
 }
 
 /// A run's page that was written elsewhere, once more in the run's folder: the dashboard lists the pages there and no others.
 fn keep_in_run(run: &Path, page: &Path, text: &str) {
     let inside = || Some(page.canonicalize().ok()?.parent()? == run.canonicalize().ok()?);
     if inside() == Some(false) {
-        let copy = run.join(runs::verdict::files::PAGE);
+        let copy = run.join(files::PAGE);
         match write_text(&copy, text) {
             Ok(()) => say!("the dashboard lists its copy: {}", copy.display()),
             Err(why) => say!("the dashboard will not list this page: {why}"),
@@ -248,12 +260,6 @@ fn tell_partial(stage: Option<&Stage>, json: bool) {
     for (effects, nats) in leading.iter().take(PRINTED) {
         out!("  {:+9.1} nats over no gap  {}", nats, effects.join(" + "));
     }
-}
-
-fn read_table(path: &Path) -> miette::Result<Vec<Pass>> {
-    let bytes =
-        bytes_of(path, MAX_TABLE_BYTES).wrap_err_with(|| format!("cannot read {}", path.display()))?;
-    parse_passes(path, &bytes)
 }
 
 fn write_text(path: &Path, text: &str) -> miette::Result<()> {

@@ -12,10 +12,10 @@ use axum::{Json, Router};
 use runs::catalogue::Annotations;
 use runs::compare::groups::{GroupBy, MOST_COMPARED};
 use runs::report::{EXPLORE, FIGURES, UPLOT, UPLOT_STYLE};
-use runs::verdict::files::diagnose_run;
 use serde::Deserialize;
 use std::sync::{Arc, PoisonError};
 use std::time::Duration;
+use tables::verdict::diagnose_run;
 
 /// Largest body of a request in bytes.
 const BODY: usize = 256;

@@ -3,15 +3,14 @@
 use super::{Case, Cell, Kind, count, joined, line, number, text};
 use crate::cases::file::Header;
 use calibration::certificate::sha256_hex;
-use diagnosis::data::Table;
 use diagnosis::document::document;
 use diagnosis::hypotheses::Options;
-use diagnosis::verdict::diagnose;
 use miette::Context;
 use runs::input::{MAX_TABLE_BYTES, bytes_of, rig_text, text_of};
 use serde::{Deserialize, Serialize};
 use std::path::{Path, PathBuf};
 use tables::passes::parse_passes;
+use tables::verdict::{Subject, inputs};
 
 /// The kind.
 pub const KIND: Kind = Kind {
@@ -57,20 +56,6 @@ pub struct Settings {
     pub effect: Vec<PathBuf>,
 }
 
-impl Line {
-    /// The table and the rig.toml of a line.
-    fn files(&self, folder: &Path) -> (PathBuf, PathBuf) {
-        let data = folder.join(&self.data);
-        let (table, beside) = if data.is_dir() {
-            (data.join("points.csv"), data.join("rig.toml"))
-        } else {
-            let beside = data.parent().unwrap_or(folder).join("rig.toml");
-            (data, beside)
-        };
-        (table, self.rig.as_ref().map_or(beside, |rig| folder.join(rig)))
-    }
-}
-
 fn prepare(header: &Header, folder: &Path) -> miette::Result<super::Make> {
     let settings: Settings = super::settings(header)?;
     for name in &settings.without {
@@ -85,17 +70,14 @@ fn prepare(header: &Header, folder: &Path) -> miette::Result<super::Make> {
     let folder = folder.to_path_buf();
     Ok(Box::new(move |index, given| {
         let case: Line = line(index, given)?;
-        let (table_path, rig_path) = case.files(&folder);
+        let data = folder.join(&case.data);
+        let (table_path, rig_path) = inputs(&data, case.rig.map(|rig| folder.join(rig)));
         // What cannot be read is no answer about the table: the case is not run, and another try may read it.
         let bytes = bytes_of(&table_path, MAX_TABLE_BYTES)
             .wrap_err_with(|| format!("case {index}: cannot read the table {}", table_path.display()))?;
         let rig = text_of(&rig_path)
             .wrap_err_with(|| format!("case {index}: cannot read the rig's calibration"))?;
-        let damage = if folder.join(&case.data).is_dir() {
-            runs::run_dir::damage_in(&folder.join(&case.data))?
-        } else {
-            Vec::new()
-        };
+        let damage = if data.is_dir() { runs::run_dir::damage_in(&data)? } else { Vec::new() };
         let inputs = format!("{} {} {rest} {damage:?}", sha256_hex(&bytes), sha256_hex(rig.as_bytes()));
         let (settings, own) = (settings.clone(), own.clone());
         let run = move || {
@@ -105,14 +87,14 @@ fn prepare(header: &Header, folder: &Path) -> miette::Result<super::Make> {
             let rig = rig_text("rig.toml", &rig).map_err(plain)?;
             let passes = parse_passes(&table_path, &bytes)
                 .map_err(|why| plain(why).replace(&table_path.display().to_string(), "table"))?;
-            let table = Table::measured(&passes).map_err(|why| why.to_string())?;
+            let subject = Subject::of(passes, &bytes, rig).map_err(|why| why.to_string())?;
             let options = Options {
                 pairs: !settings.no_pairs,
                 without: settings.without.clone(),
                 own,
                 ..Options::default()
             };
-            let result = diagnose(&table, &rig, &options, sha256_hex(&bytes));
+            let result = subject.diagnose(options, None).map_err(plain)?;
             let first = result.report.hypotheses.first();
             let verdict = serde_json::to_value(result.report.verdict).map_err(|e| e.to_string())?;
             Ok(vec![
@@ -121,8 +103,8 @@ fn prepare(header: &Header, folder: &Path) -> miette::Result<super::Make> {
                 first.map(|h| h.probability).into(),
                 result.report.gap.shrinkage.into(),
                 result.report.gap.unexplained_share.into(),
-                Cell::Count(passes.len() as u64),
-                document(&result, &rig, &damage).map_err(|why| why.to_string())?.into(),
+                Cell::Count(subject.passes.len() as u64),
+                document(&result, &subject.rig, &damage).map_err(|why| why.to_string())?.into(),
             ])
         };
         Ok(Case { inputs, run: Box::new(run) })

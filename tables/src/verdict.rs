@@ -1,0 +1,105 @@
+//! From a table and the rig.toml beside it to a verdict, its page, and the files in a run's folder.
+
+use crate::law::Loaded;
+use crate::passes::parse_passes;
+use calibration::certificate::sha256_hex;
+use diagnosis::data::{DataError, Table};
+use diagnosis::hypotheses::Options;
+use diagnosis::law::{CannotTell, Law};
+use diagnosis::verdict::{Diagnosis, diagnose};
+use miette::{IntoDiagnostic, WrapErr};
+use models::pass::Pass;
+use models::rig_file::RigFile;
+use runs::input::{MAX_TABLE_BYTES, bytes_of, rig_file};
+use runs::report::{about, diagnosis::page};
+use runs::run_dir::{damage_in, is_held, record_facts};
+use runs::verdict::{add_record, files};
+use std::path::{Path, PathBuf};
+use std::sync::Arc;
+
+/// The point table of `data`, a table or a run's folder, and the rig.toml: `rig`, or the one beside it.
+pub fn inputs(data: &Path, rig: Option<PathBuf>) -> (PathBuf, PathBuf) {
+    let (table, folder) = match data.is_dir() {
+        true => (data.join("points.csv"), data),
+        false => (data.to_path_buf(), data.parent().unwrap_or(Path::new("."))),
+    };
+    (table, rig.unwrap_or_else(|| folder.join("rig.toml")))
+}
+
+/// A table and what is known of its rig: the subject of a verdict.
+pub struct Subject {
+    /// All passes that were read.
+    pub passes: Vec<Pass>,
+    /// Those that are diagnosed.
+    pub table: Table,
+    /// What the rig's calibration states.
+    pub rig: RigFile,
+    law: Option<Arc<Law>>,
+    sha256: String,
+}
+
+impl Subject {
+    /// The passes of a table; `bytes` are those of its file.
+    ///
+    /// # Errors
+    /// Passes that cannot be diagnosed: [`Table::measured`].
+    pub fn of(passes: Vec<Pass>, bytes: &[u8], rig: RigFile) -> Result<Self, DataError> {
+        let (table, sha256) = (Table::measured(&passes)?, sha256_hex(bytes));
+        Ok(Subject { passes, table, rig, law: None, sha256 })
+    }
+
+    /// The same on a base law in place of the spring-slider.
+    ///
+    /// # Errors
+    /// A law that can tell at too few passes: [`Law::on`].
+    pub fn on(self, base: Loaded) -> Result<Self, CannotTell> {
+        let (law, table) = Law::on(base.model, base.file.map(|(_, text)| text), &self.table)?;
+        Ok(Subject { law: Some(Arc::new(law)), table, ..self })
+    }
+
+    /// The verdict, with what the record in the folder `run` says of time.
+    ///
+    /// # Errors
+    /// A record that cannot be opened.
+    pub fn diagnose(&self, options: Options, run: Option<&Path>) -> miette::Result<Diagnosis> {
+        let options = Options { law: self.law.clone(), ..options };
+        let mut result = diagnose(&self.table, &self.rig, &options, self.sha256.clone());
+        run.map_or(Ok(()), |run| add_record(&mut result, run, &self.rig))?;
+        Ok(result)
+    }
+
+    /// The page of a verdict on a run's folder.
+    ///
+    /// # Errors
+    /// Those of the drawing library.
+    pub fn page_of_run(&self, result: &Diagnosis, run: &Path) -> miette::Result<String> {
+        let facts = record_facts(run).unwrap_or_default();
+        page(result, &self.table, &about::of_run(run, &facts, Some(&self.rig)))
+    }
+
+    /// The page of a verdict on a table; with the names of table and rig.toml.
+    ///
+    /// # Errors
+    /// Those of the drawing library.
+    pub fn page_of_table(&self, result: &Diagnosis, table: &str, rig: &str) -> miette::Result<String> {
+        let named = vec![("table", table.to_string()), ("rig", rig.to_string())];
+        page(result, &self.table, &[named, about::of_rig(&self.rig)].concat())
+    }
+}
+
+/// Diagnoses a run that is over and writes what comes of it into its folder.
+///
+/// # Errors
+/// A run that goes on, a folder without one, a table that cannot be diagnosed.
+pub fn diagnose_run(run: &Path) -> miette::Result<()> {
+    if is_held(run) {
+        miette::bail!("{}: the run goes on; diagnose it when it is over", run.display());
+    }
+    let (path, rig) = inputs(run, None);
+    let bytes = bytes_of(&path, MAX_TABLE_BYTES)?;
+    let passes = parse_passes(&path, &bytes)?;
+    let subject = Subject::of(passes, &bytes, rig_file(&rig)?);
+    let subject = subject.into_diagnostic().wrap_err_with(|| path.display().to_string())?;
+    let result = subject.diagnose(Options::default(), Some(run))?;
+    files::write(run, &result, &subject.rig, &subject.page_of_run(&result, run)?, &damage_in(run)?)
+}
