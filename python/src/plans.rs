@@ -48,7 +48,7 @@ pub fn plan_passes(name: &str, text: &str, setup: &str, seed: Option<u64>) -> Py
         let (model_file, defects, out, notes) = (None, None, PathBuf::new(), Default::default());
         let job =
             Job { setup, plan, seed, model, model_file, defects, out, fast: true, notes, answers: None };
-        serde_json::to_string(&job.points_seen(None)?).into_diagnostic()
+        serde_json::to_string(&job.points()?).into_diagnostic()
     };
     passes().map_err(refused)
 }

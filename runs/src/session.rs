@@ -193,6 +193,9 @@ pub struct Signals {
     pub paused: Arc<AtomicBool>,
 }
 
+/// A target, and what the rig will not show of it, in sentences.
+pub type Followed = (Target, Vec<String>);
+
 /// A run whose folder is open and whose passes are ordered.
 pub struct Begun {
     /// The run's folder.
@@ -246,14 +249,15 @@ impl Job {
     /// The values that the rig cannot do, or the first series whose expected change of force its sensor cannot
     /// see, with their places in the plan.
     pub fn points(&self) -> miette::Result<Vec<Point>> {
-        self.points_seen(None)
+        Ok(self.points_seen(None)?.0)
     }
 
-    /// The same, with the noise in N that the lateral channel was found to have.
+    /// The same, with the noise in N that the lateral channel was found to have; and the target of a plan
+    /// that renders one.
     ///
     /// # Errors
-    /// As [`Job::points`].
-    pub fn points_seen(&self, noise_n: Option<f64>) -> miette::Result<Vec<Point>> {
+    /// As [`Job::points`]; a target that cannot be had, or that the rig cannot follow.
+    pub fn points_seen(&self, noise_n: Option<f64>) -> miette::Result<(Vec<Point>, Option<Followed>)> {
         let resolution = self.resolution()?;
         let points = self.plan.points(self.seed, &self.setup.config.limits, &resolution)?;
         self.plan.check_ambient(&self.setup)?;
@@ -263,15 +267,11 @@ impl Job {
             let mu0 = self.setup.tip.mu0;
             self.plan.check_visible(&points, &resolution, &*self.model, mu0, &channel)?;
         }
-        self.followed(&points)?;
-        Ok(points)
+        let followed = self.followed(&points)?;
+        Ok((points, followed))
     }
 
-    /// The target of a plan that renders one, and what the rig will not show of it, in sentences.
-    ///
-    /// # Errors
-    /// A target that cannot be had, or that the rig cannot follow.
-    pub fn followed(&self, points: &[Point]) -> miette::Result<Option<(Target, Vec<String>)>> {
+    fn followed(&self, points: &[Point]) -> miette::Result<Option<Followed>> {
         let (limits, mu0) = (&self.setup.config.limits, self.setup.tip.mu0);
         let known = |frequency_hz| Dynamics::of(&self.setup, frequency_hz);
         let feedback = self.plan.feedback(&known(self.plan.file.base.frequency_hz))?;
@@ -311,8 +311,8 @@ impl Job {
     /// # Errors
     /// A refusal: passes that the rig cannot do, a folder of another run or of a living one.
     pub fn begin(&mut self) -> miette::Result<Begun> {
-        let points = self.points()?;
-        if let Some((target, _)) = self.followed(&points)? {
+        let (points, followed) = self.points_seen(None)?;
+        if let Some((target, _)) = followed {
             self.model = Arc::new(Rendering { law: Arc::clone(&self.model), target });
         }
         let planned = points.len();

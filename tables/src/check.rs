@@ -314,7 +314,7 @@ pub fn preflight(
         notes: Default::default(),
         answers: None,
     };
-    Ok(job.points_seen(noise_n)?.len())
+    Ok(job.points_seen(noise_n)?.0.len())
 }
 
 /// The limits of a rig that has the hard ones only.

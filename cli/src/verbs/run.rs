@@ -20,7 +20,7 @@ use runs::sequence::{Event, Outcome};
 use runs::session::{Job, Notes, Signals, Summary, Update, unix_ns};
 use runs::setup::Setup;
 use runs::supervisor::MAY_BE_ON;
-use serde_json::json;
+use serde_json::{Value, json};
 use std::io::IsTerminal;
 use std::net::SocketAddr;
 use std::path::{Path, PathBuf};
@@ -115,11 +115,9 @@ pub fn run(mut args: Args, json: bool) -> miette::Result<ExitCode> {
     }
     let job = job(&args)?;
     // An address that is taken is a refusal: nothing was touched yet.
-    let points = job.points()?;
+    let (points, followed) = job.points_seen(None)?;
     let mu0 = job.setup.tip.mu0;
-    if let Some((_, remarks)) = job.followed(&points)? {
-        remarks.iter().for_each(|remark| report!("{remark}"));
-    }
+    followed.iter().flat_map(|(_, remarks)| remarks).for_each(|remark| report!("{remark}"));
     let untold = |c: &Condition| job.model.predict(&Condition { mu0, ..*c }).is_err();
     match points.iter().filter(|p| untold(&p.condition)).count() {
         0 => {}
@@ -134,7 +132,7 @@ pub fn run(mut args: Args, json: bool) -> miette::Result<ExitCode> {
     }
     let runs = job.out.parent().filter(|p| !p.as_os_str().is_empty()).unwrap_or(Path::new("."));
     let watching = Watching::begin(&mut args, runs)?;
-    super::exit(if measure(job, &watching, json)? { super::DONE } else { super::FAILED })
+    super::exit(if measure(job, points.len(), &watching, json)? { super::DONE } else { super::FAILED })
 }
 
 /// Who follows a run: a terminal, a broker.
@@ -160,13 +158,41 @@ impl Watching {
     }
 }
 
-/// Measures one run, and says so to whoever follows; whether it is complete, and was read back off.
-fn measure(job: Job, watching: &Watching, json: bool) -> miette::Result<bool> {
-    let (broker, tui) = (watching.broker.clone(), watching.tui);
+/// Measures one run of so many passes. Returns whether it is complete, and the drive was read back off.
+fn measure(job: Job, planned: usize, watching: &Watching, json: bool) -> miette::Result<bool> {
     if !job.fast {
         // In virtual time nothing is driven, and a slow reader gets every line.
         super::tell_beside(&job.out)?;
     }
+    keys_are_free(&job, watching.tui)?;
+    let signals = Signals::default();
+    watch_signals(&signals)?;
+    // Up before anything moves, and down before the summary. Output in between is held and printed then.
+    let watch = match watching.tui {
+        true => Some(Watch::begin(&job.out, Lead::Own(signals.clone()), job.setup.hand_at_key())?),
+        false => None,
+    };
+    let mut followers = Followers::begin(&job, planned, watching, json)?;
+    let before = runs::run_dir::passes_in(&job.out).unwrap_or_default();
+    let mut feed = Feed::new(live::Run::of(&job, planned, before.len()), before, &signals);
+    let summary = rig::session::run(job, &signals, &mut |news| {
+        feed.news(&news);
+        followers.news(&news);
+    });
+    let bar = followers.bar.clone();
+    print::draw("", move || bar.finish_and_clear());
+    drop(watch);
+    if let Ok(summary) = &summary {
+        tell(summary, json);
+    }
+    feed.end(live::Ended::of(&summary));
+    followers.end(&summary, watching.broker.as_ref());
+    let summary = summary?;
+    Ok(summary.outcome == Outcome::Complete && summary.off.read_back)
+}
+
+/// Refuses a run whose dead-man key or whose questions need a terminal that something else uses.
+fn keys_are_free(job: &Job, tui: bool) -> miette::Result<()> {
     if job.setup.hand_at_key() {
         if job.fast {
             miette::bail!(
@@ -186,69 +212,78 @@ fn measure(job: Job, watching: &Watching, json: bool) -> miette::Result<bool> {
             "the plan asks a person for answers at the terminal, and {taken} takes its keys"
         );
     }
-    let signals = Signals::default();
-    watch_signals(&signals)?;
-    let planned = job.points()?.len();
-    // Up before anything moves, and down before the summary. Output in between is held and printed then.
-    let watch = match tui {
-        true => Some(Watch::begin(&job.out, Lead::Own(signals.clone()), job.setup.hand_at_key())?),
-        false => None,
-    };
-    let bar = progress_bar(json || tui, planned as u64);
-    // Looked at once: while it is drawn, whoever asks it anything waits for the terminal.
-    let hidden = bar.is_hidden();
-    let say = |text: String| {
-        let (text, bar) = (clean(&fitted(text)).into_owned(), bar.clone());
-        if hidden { say!("{text}") } else { print::draw(&text.clone(), move || bar.println(text)) }
-    };
-    if !json {
-        let clock = if job.fast { "virtual time" } else { "wall-clock time" };
-        say(format!(
-            "{} on {}: {planned} passes in {clock}, into {}",
-            job.plan.file.name,
-            job.setup.file.name,
-            job.out.display()
-        ));
-    }
-    let mut publisher = broker.as_ref().map(Publisher::start).transpose()?;
-    let mut publish = |name: &str, message: &dyn Fn() -> serde_json::Value| {
-        if let Some(publisher) = &mut publisher {
-            publisher.publish(name, &message());
+    Ok(())
+}
+
+/// Where the news of one run go: the terminal or a program, and a broker.
+struct Followers {
+    json: bool,
+    planned: usize,
+    bar: ProgressBar,
+    hidden: bool,
+    publisher: Option<Publisher>,
+    /// What the run is of, for the broker.
+    of: Value,
+}
+
+impl Followers {
+    /// Says what begins.
+    fn begin(job: &Job, planned: usize, watching: &Watching, json: bool) -> miette::Result<Self> {
+        let bar = progress_bar(json || watching.tui, planned as u64);
+        // Looked at once: while it is drawn, whoever asks it anything waits for the terminal.
+        let hidden = bar.is_hidden();
+        let (plan, setup) = (&job.plan.file.name, &job.setup.file.name);
+        let (state, guards) = ("running", job.setup.guards());
+        let of =
+            json!({ "plan": plan, "setup": setup, "planned": planned, "guards": guards, "state": state });
+        let mut followers = Followers { json, planned, bar, hidden, publisher: None, of };
+        if !json {
+            let clock = if job.fast { "virtual time" } else { "wall-clock time" };
+            let out = job.out.display();
+            followers.say(format!("{plan} on {setup}: {planned} passes in {clock}, into {out}"));
         }
-    };
-    let of = json!({ "plan": job.plan.file.name, "setup": job.setup.file.name, "planned": planned, "guards": job.setup.guards() });
-    let began = |state: &str| {
-        let mut run = of.clone();
-        run["state"] = state.into();
-        run
-    };
-    publish("run", &|| began("running"));
-    let before = runs::run_dir::passes_in(&job.out).unwrap_or_default();
-    let mut feed = Feed::new(live::Run::of(&job, planned, before.len()), before, &signals);
-    let summary = rig::session::run(job, &signals, &mut |news| {
-        feed.news(&news);
+        followers.publisher = watching.broker.as_ref().map(Publisher::start).transpose()?;
+        followers.publish("run", Value::clone);
+        Ok(followers)
+    }
+
+    /// A line on the terminal, above the bar.
+    fn say(&self, text: String) {
+        let (text, bar) = (clean(&fitted(text)).into_owned(), self.bar.clone());
+        if self.hidden { say!("{text}") } else { print::draw(&text.clone(), move || bar.println(text)) }
+    }
+
+    /// A message to the broker, made of what the run is of.
+    fn publish(&mut self, name: &str, message: impl FnOnce(&Value) -> Value) {
+        if let Some(publisher) = &mut self.publisher {
+            publisher.publish(name, &message(&self.of));
+        }
+    }
+
+    fn news(&mut self, news: &Update<'_>) {
         match news {
             Update::Pass(pass) => {
-                publish("pass", &|| json!(pass));
-                if json {
+                self.publish("pass", |_| json!(pass));
+                if self.json {
                     answer_json(&json!({ "pass": pass }));
                 }
             }
             Update::Event(event) => {
-                publish("event", &|| json!(event));
+                self.publish("event", |_| json!(event));
                 if let Event::Tripped(trip) = event {
-                    publish("trip", &|| tripped(trip));
+                    self.publish("trip", |_| tripped(trip));
                 }
-                if json {
+                if self.json {
                     answer_json(&json!({ "event": event }));
                 } else {
-                    say(runs::report::events::describe(event));
+                    self.say(runs::report::events::describe(event));
                 }
             }
-            Update::State(snapshot) => publish("state", &|| json!(live::State::of(snapshot))),
+            Update::State(snapshot) => self.publish("state", |_| json!(live::State::of(snapshot))),
             Update::Progress(made, all, left_s) => {
-                publish("progress", &|| json!({ "made": made, "planned": all, "remaining_s": left_s }));
-                let bar = bar.clone();
+                let (planned, made, all, left_s) = (self.planned, *made, *all, *left_s);
+                self.publish("progress", |_| json!({ "made": made, "planned": all, "remaining_s": left_s }));
+                let bar = self.bar.clone();
                 print::draw("", move || {
                     bar.set_position((planned.saturating_sub(all) + made) as u64);
                     bar.set_message(format!("{left_s:.0} s to go"));
@@ -256,39 +291,33 @@ fn measure(job: Job, watching: &Watching, json: bool) -> miette::Result<bool> {
             }
             Update::Off(off) if !off.read_back => {
                 print::urgent(&fitted(off.words()));
-                publish("off", &|| json!(off));
-                if json {
+                self.publish("off", |_| json!(off));
+                if self.json {
                     answer_json(&json!({ "off": off }));
                 }
             }
             Update::Off(_) => {}
         }
-    });
-    print::draw("", move || bar.finish_and_clear());
-    drop(watch);
-    if let Ok(summary) = &summary {
-        tell(summary, json);
     }
-    feed.end(live::Ended::of(&summary));
-    publish("run", &|| {
-        let mut ended = began("ended");
-        ended["summary"] = summary.as_ref().map_or_else(
+
+    /// Publishes how the run ended, and says what the broker did not get.
+    fn end(mut self, summary: &miette::Result<Summary>, broker: Option<&Broker>) {
+        self.of["state"] = "ended".into();
+        self.of["summary"] = summary.as_ref().map_or_else(
             |why| json!({ "error": why.to_string() }),
             |summary| json!({ "passes": summary.passes, "outcome": summary.outcome, "off": summary.off }),
         );
-        ended
-    });
-    if let (Some(publisher), Some(broker)) = (publisher, &broker)
-        && let Some(missing) = publisher.end()
-    {
-        report!("{}:{}: {missing}", broker.host, broker.port);
+        self.publish("run", Value::clone);
+        if let (Some(publisher), Some(broker)) = (self.publisher, broker)
+            && let Some(missing) = publisher.end()
+        {
+            report!("{}:{}: {missing}", broker.host, broker.port);
+        }
     }
-    let summary = summary?;
-    Ok(summary.outcome == Outcome::Complete && summary.off.read_back)
 }
 
 /// A trip for whoever follows from afar.
-fn tripped(trip: &realtime::safety::Trip) -> serde_json::Value {
+fn tripped(trip: &realtime::safety::Trip) -> Value {
     json!({
         "cause": trip.cause, "value": Some(trip.value).filter(|v| v.is_finite()), "bound": trip.bound, "unit": trip.unit.symbol(),
         "at_s": trip.at.seconds(), "requirement": trip.cause.requirement(), "remedy": trip.cause.remedy(),

@@ -65,7 +65,8 @@ pub fn run(mut args: Args, text: &str, folder: &Path, json: bool) -> miette::Res
                 cell.condition
             );
         }
-        whole = measure(job, &watching, json)?;
+        let planned = job.points()?.len();
+        whole = measure(job, planned, &watching, json)?;
         if !whole || instruments {
             break;
         }
