@@ -82,7 +82,7 @@ impl Parameter {
 }
 
 /// What the model left of the data.
-#[derive(Clone, Debug, PartialEq, Serialize, Deserialize, schemars::JsonSchema)]
+#[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize, schemars::JsonSchema)]
 #[serde(deny_unknown_fields)]
 pub struct Residuals {
     /// Number of residuals.

@@ -12,6 +12,7 @@ use crate::identify::Identified;
 use crate::identify::skin::{IdentifiedSkin, Profile};
 use crate::regression::FitError;
 use friction::FrictionFit;
+use nalgebra::DMatrix;
 use springs::Springs;
 use std::collections::BTreeMap;
 use stiffness::Stiffness;
@@ -64,81 +65,17 @@ pub struct FingerFit {
 impl FingerFit {
     /// Everything that the certificate states.
     pub fn outcome(&self) -> Outcome {
-        let (mut findings, mut blocks) = (Vec::new(), Vec::new());
-        // Intervals that are not value +- k u: where each begins at the earliest, or the whole of it.
-        let mut ends = Vec::new();
-        let mut range = BTreeMap::new();
-        let mut budget = Vec::new();
-        let mut count = 0;
-        let (mut sd, mut largest, mut unit) = (0.0, 0.0, String::new());
-        for (name, s) in &self.stiffness {
-            let dof = s.degrees_of_freedom;
-            findings.push(Finding::new(format!("{name}.stiffness"), "N/m", s.value_n_per_m, dof));
-            findings.push(Finding::new(format!("{name}.loss_tangent"), "1", s.loss_tangent, dof));
-            ends.extend([Ends::AtLeast(0.0); 2]);
-            let source = format!("{name}: force and displacement calibration");
-            budget.push(BudgetLine::b(source, s.scale_relative_sd, "1"));
-            range.insert(format!("{name}.displacement_m"), s.range_m);
-            count += s.points as u64;
-            (sd, largest, unit) = (s.residual_sd_n, s.largest_residual_n, "N".into());
+        let mut parts = Parts::default();
+        self.stiffness.iter().for_each(|(name, stiffness)| parts.stiffness(name, stiffness));
+        let mut settings = BTreeMap::new();
+        if let Some(friction) = &self.friction {
+            parts.friction(friction);
+            settings.insert("reference_force_n".into(), friction.reference_force_n.to_string());
+            settings.insert("reference_speed_m_s".into(), friction.reference_speed_m_s.to_string());
         }
-        let mut remarks = Vec::new();
-        if let Some(f) = &self.friction {
-            blocks.push((findings.len(), f.fit.covariance.clone()));
-            for (i, (name, unit)) in f.names().into_iter().enumerate() {
-                // mu0 (1 + growth) is the coefficient of friction in the end: it cannot be negative.
-                ends.push(if name.ends_with(".growth") { Ends::AtLeast(-1.0) } else { Ends::Free });
-                let estimate = [f.fit.estimates[i], f.fit.standard_uncertainty(i)];
-                findings.push(Finding::new(name, unit, estimate, f.fit.degrees_of_freedom));
-            }
-            count += f.fit.residuals.len() as u64;
-            (sd, largest, unit) = (f.fit.residual_sd(), f.fit.residuals.amax(), "1 (of ln mu0)".into());
-            range.extend(f.range());
-            remarks.extend(f.remarks());
-        }
-        if let Some(s) = &self.springs {
-            let normal = (s.normal_stiffness_n_per_m, s.normal_ci95_n_per_m, s.normal_closed);
-            let ratio = (s.lateral_over_normal, s.ratio_ci95, s.ratio_closed);
-            let fits = [
-                ("sweep.normal_stiffness", "N/m", normal),
-                ("sweep.lateral_over_normal_stiffness", "1", ratio),
-            ];
-            for (name, unit, (value, ci95, closed)) in fits {
-                if closed == [true; 2] {
-                    let dof = (s.passes as f64 - 3.0).max(1.0);
-                    findings.push(Finding::new(name, unit, [value, half_width_sd(ci95)], dof));
-                    ends.push(Ends::Both(ci95));
-                } else {
-                    let [low, high] = [0, 1].map(|i| end(ci95[i], closed[i]));
-                    remarks.push(format!(
-                        "{name}: {value:.3e} {unit}, but the passes leave its interval open: {low} to {high}"
-                    ));
-                }
-            }
-            remarks.push(format!(
-                "the sweep's stiffnesses are those of the spring-slider that fits {} passes best, chi-square {:.2} a degree of freedom",
-                s.passes, s.reduced_chi2
-            ));
-            count += s.passes as u64;
-            if s.left_out > 0 {
-                remarks.push(format!(
-                    "{} passes were left out: without a force, or at a condition that the slider does not take",
-                    s.left_out
-                ));
-            }
-            (sd, largest, unit) = (s.residual_rms_n, s.residual_largest_n, "N".into());
-        }
-        if let Some(m) = &self.modulus {
-            let fit = ModulusFit::of(m, self.skin.as_ref());
-            for (name, unit, value, ci95) in fit.parameters {
-                let dof = (m.points as f64 - 1.0).max(1.0);
-                findings.push(Finding::new(name, unit, [value, half_width_sd(ci95)], dof));
-                ends.push(Ends::Both(ci95));
-            }
-            count += m.points as u64;
-            (sd, largest, unit) = (m.residual_deg[0], m.residual_deg[1], "deg".into());
-            remarks.extend(fit.remarks);
-        }
+        self.springs.iter().for_each(|springs| parts.springs(springs));
+        self.modulus.iter().for_each(|modulus| parts.modulus(modulus, self.skin.as_ref()));
+        let Parts { findings, blocks, ends, range, budget, mut remarks, residuals } = parts;
         let covariance = Finding::covariance(&findings, &blocks);
         let parameters: Vec<_> = parameters(&findings, &covariance)
             .into_iter()
@@ -157,11 +94,6 @@ impl FingerFit {
                 ));
             }
         }
-        let mut settings = BTreeMap::new();
-        if let Some(f) = &self.friction {
-            settings.insert("reference_force_n".into(), f.reference_force_n.to_string());
-            settings.insert("reference_speed_m_s".into(), f.reference_speed_m_s.to_string());
-        }
         Outcome {
             kind: Kind::Finger,
             model: "F = F0 + k (x - x0) + loop; F1 = (k' + i k'') a in full contact; \
@@ -171,11 +103,101 @@ impl FingerFit {
             remarks,
             parameters,
             covariance,
-            residuals: Residuals { count, sd, largest, unit, lack_of_fit_p: None },
+            residuals,
             temperature_c: None,
             range,
             budget,
         }
+    }
+}
+
+/// What the parts of a calibration add to the certificate, one after the other.
+#[derive(Default)]
+struct Parts {
+    findings: Vec<Finding>,
+    /// Covariances of findings that were fitted together, from the first of each.
+    blocks: Vec<(usize, DMatrix<f64>)>,
+    /// Intervals that are not value +- k u: where each begins at the earliest, or the whole of it.
+    ends: Vec<Ends>,
+    range: BTreeMap<String, [f64; 2]>,
+    budget: Vec<BudgetLine>,
+    remarks: Vec<String>,
+    /// Counts all rows; the rest is that of the last part.
+    residuals: Residuals,
+}
+
+impl Parts {
+    fn residuals(&mut self, count: usize, sd: f64, largest: f64, unit: &str) {
+        let count = self.residuals.count + count as u64;
+        self.residuals = Residuals { count, sd, largest, unit: unit.into(), lack_of_fit_p: None };
+    }
+
+    /// A finding whose interval comes from a profile of the likelihood.
+    fn profiled(&mut self, name: &'static str, unit: &'static str, value: f64, ci95: [f64; 2], dof: f64) {
+        self.findings.push(Finding::new(name, unit, [value, half_width_sd(ci95)], dof.max(1.0)));
+        self.ends.push(Ends::Both(ci95));
+    }
+
+    fn stiffness(&mut self, name: &str, s: &Stiffness) {
+        let dof = s.degrees_of_freedom;
+        self.findings.push(Finding::new(format!("{name}.stiffness"), "N/m", s.value_n_per_m, dof));
+        self.findings.push(Finding::new(format!("{name}.loss_tangent"), "1", s.loss_tangent, dof));
+        self.ends.extend([Ends::AtLeast(0.0); 2]);
+        let source = format!("{name}: force and displacement calibration");
+        self.budget.push(BudgetLine::b(source, s.scale_relative_sd, "1"));
+        self.range.insert(format!("{name}.displacement_m"), s.range_m);
+        self.residuals(s.points, s.residual_sd_n, s.largest_residual_n, "N");
+    }
+
+    fn friction(&mut self, f: &FrictionFit) {
+        self.blocks.push((self.findings.len(), f.fit.covariance.clone()));
+        for (i, (name, unit)) in f.names().into_iter().enumerate() {
+            // mu0 (1 + growth) is the coefficient of friction in the end: it cannot be negative.
+            self.ends.push(if name.ends_with(".growth") { Ends::AtLeast(-1.0) } else { Ends::Free });
+            let estimate = [f.fit.estimates[i], f.fit.standard_uncertainty(i)];
+            self.findings.push(Finding::new(name, unit, estimate, f.fit.degrees_of_freedom));
+        }
+        let residuals = &f.fit.residuals;
+        self.residuals(residuals.len(), f.fit.residual_sd(), residuals.amax(), "1 (of ln mu0)");
+        self.range.extend(f.range());
+        self.remarks.extend(f.remarks());
+    }
+
+    fn springs(&mut self, s: &Springs) {
+        let normal = (s.normal_stiffness_n_per_m, s.normal_ci95_n_per_m, s.normal_closed);
+        let ratio = (s.lateral_over_normal, s.ratio_ci95, s.ratio_closed);
+        let fits =
+            [("sweep.normal_stiffness", "N/m", normal), ("sweep.lateral_over_normal_stiffness", "1", ratio)];
+        for (name, unit, (value, ci95, closed)) in fits {
+            if closed == [true; 2] {
+                self.profiled(name, unit, value, ci95, s.passes as f64 - 3.0);
+            } else {
+                let [low, high] = [0, 1].map(|i| end(ci95[i], closed[i]));
+                self.remarks.push(format!(
+                    "{name}: {value:.3e} {unit}, but the passes leave its interval open: {low} to {high}"
+                ));
+            }
+        }
+        self.remarks.push(format!(
+            "the sweep's stiffnesses are those of the spring-slider that fits {} passes best, chi-square {:.2} a degree of freedom",
+            s.passes, s.reduced_chi2
+        ));
+        if s.left_out > 0 {
+            self.remarks.push(format!(
+                "{} passes were left out: without a force, or at a condition that the slider does not take",
+                s.left_out
+            ));
+        }
+        self.residuals(s.passes, s.residual_rms_n, s.residual_largest_n, "N");
+    }
+
+    fn modulus(&mut self, m: &Identified, skin: Option<&IdentifiedSkin>) {
+        let fit = ModulusFit::of(m, skin);
+        for (name, unit, value, ci95) in fit.parameters {
+            self.profiled(name, unit, value, ci95, m.points as f64 - 1.0);
+        }
+        self.residuals(m.points, m.residual_deg[0], m.residual_deg[1], "deg");
+        self.remarks.extend(fit.remarks);
     }
 }
 

@@ -50,15 +50,34 @@ pub fn embed(
     plant: &SharedPlant,
     everywhere: bool,
 ) -> Result<Embedded, String> {
-    let mut embedded = Embedded::default();
-    let mut registers: BTreeMap<String, BTreeMap<u8, Device>> = BTreeMap::new();
-    let mut buses: BTreeMap<String, Vec<CanDevice>> = BTreeMap::new();
-    let mut shared: BTreeMap<String, BTreeMap<u8, Device>> = BTreeMap::new();
     if let Some(weight) = setup.stage.dead_weight_n {
         plant.now().0.command(&[(Command::NormalForce, weight)]);
     }
     let mut all: Vec<&mut InstrumentSetup> = setup.all_mut().collect();
+    let (embedded, registers, lines, buses) = Default::default();
+    let mut serving = Serving { plant, everywhere, embedded, registers, lines, buses };
     for instrument in &mut all {
+        serving.one(instrument)?;
+    }
+    let mut embedded = serving.shared(&mut all)?;
+    embedded.places = all.iter().map(|one| format!("{} at {}", one.profile, one.address)).collect();
+    Ok(embedded)
+}
+
+/// What is served so far, and the places that several instruments may share, by address.
+struct Serving<'a> {
+    plant: &'a SharedPlant,
+    everywhere: bool,
+    embedded: Embedded,
+    registers: BTreeMap<String, BTreeMap<u8, Device>>,
+    lines: BTreeMap<String, BTreeMap<u8, Device>>,
+    buses: BTreeMap<String, Vec<CanDevice>>,
+}
+
+impl Serving<'_> {
+    /// Serves an instrument that has its place for itself; another one is put to those of its place.
+    fn one(&mut self, instrument: &mut InstrumentSetup) -> Result<(), String> {
+        let (plant, everywhere, embedded) = (self.plant, self.everywhere, &mut self.embedded);
         let mut profile = instrument.description().map_err(|error| error.to_string())?;
         if let Some(rate) = instrument.rate_hz {
             // What comes by itself comes as often as the setup expects it.
@@ -71,7 +90,7 @@ pub fn embed(
         match link.kind {
             LinkKind::ModbusTcp if !instrument.address.starts_with("rtu:") => {
                 let unit = instrument.unit.or(link.unit).unwrap_or(1);
-                let units = registers.entry(instrument.address.clone()).or_default();
+                let units = self.registers.entry(instrument.address.clone()).or_default();
                 // A board that is relay and inputs at once is named twice and served once.
                 let other = |served: &Device| served.profile().id() != instrument.profile;
                 if units.insert(unit, device).is_some_and(|served| other(&served)) {
@@ -82,18 +101,21 @@ pub fn embed(
             }
             LinkKind::ModbusTcp | LinkKind::ModbusRtu => {
                 let unit = instrument.unit.or(link.unit).unwrap_or(1);
-                if !instrument.address.ends_with("pty") {
-                    if shared.entry(instrument.address.clone()).or_default().insert(unit, device).is_some() {
+                if instrument.address.ends_with("pty") {
+                    let port = port(&mut instrument.address)?;
+                    let units = [(unit, device)].into_iter().collect();
+                    embedded
+                        .serial
+                        .push(SerialEmulator::modbus_rtu(port, units, plant.clone()).map_err(failed)?);
+                } else {
+                    let units = self.lines.entry(instrument.address.clone()).or_default();
+                    if units.insert(unit, device).is_some() {
                         let at = &instrument.address;
                         return Err(format!(
                             "two instruments at {at} have Modbus unit {unit}; give one another `unit`"
                         ));
                     }
-                    continue;
                 }
-                let port = port(&mut instrument.address)?;
-                let units = [(unit, device)].into_iter().collect();
-                embedded.serial.push(SerialEmulator::modbus_rtu(port, units, plant.clone()).map_err(failed)?);
             }
             LinkKind::Can | LinkKind::Canopen => {
                 let base = instrument.base.or(link.base).or(link.node.map(u32::from)).unwrap_or(0);
@@ -104,18 +126,17 @@ pub fn embed(
                         CanEmulator::start(adapter, vec![devices], plant.clone()).map_err(failed)?;
                     embedded.can.push(emulator);
                 } else {
-                    buses.entry(instrument.address.clone()).or_default().push(devices);
+                    self.buses.entry(instrument.address.clone()).or_default().push(devices);
                 }
             }
             LinkKind::Serial => {
                 let port = port(&mut instrument.address)?;
-                if device.profile().description.stream.is_some() {
-                    let emulator = SerialEmulator::stream(port, device, plant.clone()).map_err(failed)?;
-                    embedded.serial.push(emulator);
-                    continue;
-                }
-                let served = LineInstrument::new(device, plant.clone());
-                embedded.serial.push(SerialEmulator::lines(port, served, || None).map_err(failed)?);
+                let served = if device.profile().description.stream.is_some() {
+                    SerialEmulator::stream(port, device, plant.clone())
+                } else {
+                    SerialEmulator::lines(port, LineInstrument::new(device, plant.clone()), || None)
+                };
+                embedded.serial.push(served.map_err(failed)?);
             }
             LinkKind::Tcp | LinkKind::Udp if device.profile().description.stream.is_some() => {
                 let place = socket(&instrument.address, everywhere)?;
@@ -136,28 +157,32 @@ pub fn embed(
                 embedded.lines.push(server);
             }
         }
+        Ok(())
     }
-    for (address, units) in registers {
-        let server = ModbusTcpServer::start(socket(&address, everywhere)?, units, plant.clone())
-            .map_err(|error| format!("cannot listen on {address}: {error}"))?;
-        for instrument in all.iter_mut().filter(|instrument| instrument.address == address) {
-            instrument.address = server.address().to_string();
+
+    /// Serves the shared places with all their instruments.
+    fn shared(self, all: &mut [&mut InstrumentSetup]) -> Result<Embedded, String> {
+        let (plant, everywhere, mut embedded) = (self.plant, self.everywhere, self.embedded);
+        for (address, units) in self.registers {
+            let server = ModbusTcpServer::start(socket(&address, everywhere)?, units, plant.clone())
+                .map_err(|error| format!("cannot listen on {address}: {error}"))?;
+            for instrument in all.iter_mut().filter(|instrument| instrument.address == address) {
+                instrument.address = server.address().to_string();
+            }
+            embedded.tcp.push(server);
         }
-        embedded.tcp.push(server);
+        for (mut address, units) in self.lines {
+            let port = port(&mut address)?;
+            let failed = |error: std::io::Error| format!("{address} cannot be served: {error}");
+            embedded.serial.push(SerialEmulator::modbus_rtu(port, units, plant.clone()).map_err(failed)?);
+        }
+        for (interface, devices) in self.buses {
+            let bus = KernelCan::open(&interface).map_err(|error| error.to_string())?;
+            let emulator = CanEmulator::start(bus, devices, plant.clone());
+            embedded.can.push(emulator.map_err(|error| error.to_string())?);
+        }
+        Ok(embedded)
     }
-    for (mut address, units) in shared {
-        let port = port(&mut address)?;
-        let failed = |error: std::io::Error| format!("{address} cannot be served: {error}");
-        embedded.serial.push(SerialEmulator::modbus_rtu(port, units, plant.clone()).map_err(failed)?);
-    }
-    for (interface, devices) in buses {
-        let bus = KernelCan::open(&interface).map_err(|error| error.to_string())?;
-        embedded
-            .can
-            .push(CanEmulator::start(bus, devices, plant.clone()).map_err(|error| error.to_string())?);
-    }
-    embedded.places = all.iter().map(|one| format!("{} at {}", one.profile, one.address)).collect();
-    Ok(embedded)
 }
 
 /// An emulated instrument as it is mounted: a force sensor shows the axes that the setup has it for.

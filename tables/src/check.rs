@@ -180,25 +180,8 @@ fn judge(kind: &'static str, name: &str, on: &On, instead: Option<String>) -> mi
             ]);
         }
         "plan" => {
-            let plan = Plan::parse(name, &text)?;
-            let Some(setup) = &on.setup else {
-                let fine = Resolution { amplitude_pp_m: 0.0, frequency_hz: 0.0 };
-                plan.points(plan.file.seed, &widest(), &fine)?;
-                // The file of a target; how large a lateral force may be, the fingertip of a setup says.
-                plan.target(1e6, None)?;
-                return Ok(good);
-            };
-            complete(setup)?;
-            let passes = preflight(setup, plan, on.model.as_ref(), None);
-            let ports = on.ports.map_or(Ok(()), |opens| opens(setup));
-            return match (passes, ports) {
-                (Ok(passes), Ok(())) => Ok(Good { passes: Some(passes), ..good }),
-                (Err(why), Ok(())) | (Ok(_), Err(why)) => Err(why),
-                (Err(why), Err(closed)) => {
-                    let help = [&why, &closed].into_iter().flat_map(problems_of).filter_map(|p| p.help);
-                    Err(miette::miette!(help = help.collect::<Vec<_>>().join("; "), "{why}; {closed}"))
-                }
-            };
+            let passes = plan_on(on, Plan::parse(name, &text)?)?;
+            return Ok(Good { passes, ..good });
         }
         "campaign" => {
             let campaign = runs::campaign::Campaign::parse(name, &text, folder)?;
@@ -221,16 +204,7 @@ fn judge(kind: &'static str, name: &str, on: &On, instead: Option<String>) -> mi
             };
         }
         "fingertip" => {
-            let tip: FingertipFile = parse_toml(name, &text)?;
-            let mut wrong = Problems::of(name, &text);
-            for (place, problem) in tip.problems() {
-                let meant = match place.as_slice() {
-                    ["radius_m"] => unit_meant("radius_m", tip.radius_m, usual("radius_m")),
-                    _ => None,
-                };
-                wrong.add(&place, problem, meant);
-            }
-            wrong.end()?;
+            let tip = fingertip(name, &text)?;
             remarks = finger_remarks(&[
                 ("normal_stiffness_n_per_m", tip.finger.normal_stiffness_n_per_m),
                 ("lateral_stiffness_n_per_m", tip.finger.lateral_stiffness_n_per_m),
@@ -252,6 +226,43 @@ fn judge(kind: &'static str, name: &str, on: &On, instead: Option<String>) -> mi
         }
     }
     Ok(Good { remarks, ..good })
+}
+
+/// The passes of a plan on its setup; none where it is judged by itself.
+fn plan_on(on: &On, plan: Plan) -> miette::Result<Option<usize>> {
+    let Some(setup) = &on.setup else {
+        let fine = Resolution { amplitude_pp_m: 0.0, frequency_hz: 0.0 };
+        plan.points(plan.file.seed, &widest(), &fine)?;
+        // The file of a target; how large a lateral force may be, the fingertip of a setup says.
+        plan.target(1e6, None)?;
+        return Ok(None);
+    };
+    complete(setup)?;
+    let passes = preflight(setup, plan, on.model.as_ref(), None);
+    let ports = on.ports.map_or(Ok(()), |opens| opens(setup));
+    match (passes, ports) {
+        (Ok(passes), Ok(())) => Ok(Some(passes)),
+        (Err(why), Ok(())) | (Ok(_), Err(why)) => Err(why),
+        (Err(why), Err(closed)) => {
+            let help = [&why, &closed].into_iter().flat_map(problems_of).filter_map(|p| p.help);
+            Err(miette::miette!(help = help.collect::<Vec<_>>().join("; "), "{why}; {closed}"))
+        }
+    }
+}
+
+/// A fingertip without a problem.
+fn fingertip(name: &str, text: &str) -> miette::Result<FingertipFile> {
+    let tip: FingertipFile = parse_toml(name, text)?;
+    let mut wrong = Problems::of(name, text);
+    for (place, problem) in tip.problems() {
+        let meant = match place.as_slice() {
+            ["radius_m"] => unit_meant("radius_m", tip.radius_m, usual("radius_m")),
+            _ => None,
+        };
+        wrong.add(&place, problem, meant);
+    }
+    wrong.end()?;
+    Ok(tip)
 }
 
 fn finger_remarks(values: &[(&str, f64)]) -> Vec<String> {

@@ -28,6 +28,7 @@ use map::Map;
 use miette::{IntoDiagnostic, WrapErr};
 use models::pass::{Pass, read_passes};
 use serde::Serialize;
+use series::Spread;
 use std::path::Path;
 use targets::{Id, Kind, TARGETS};
 use values::{Dropped, Values};
@@ -263,31 +264,13 @@ fn read_known(
 /// series without steady stretches. Nothing is written.
 pub fn import(source: &str, bytes: &[u8], grid: &Grid, wanted: &Wanted<'_>) -> miette::Result<Imported> {
     let map = &wanted.map;
-    let lacks = map.lacks(wanted.series.is_some());
     let not_taken: Vec<String> = (0..grid.header.len())
         .filter(|k| !map.columns.iter().any(|c| c.index == *k))
         .map(|k| grid.header[k].clone())
         .collect();
-    if !lacks.is_empty() {
-        let left = if not_taken.is_empty() {
-            String::new()
-        } else {
-            format!("\ncolumns of {source} that are not taken: {}", not_taken.join(", "))
-        };
-        let across = across(grid).unwrap_or_default();
-        miette::bail!(help = format!("state it with --map and --set{left}{across}"), "{}", lacks.join("\n"));
-    }
+    refuse_lacks(source, grid, wanted, &not_taken)?;
     let mut notes = grid.notes.clone();
-    let mut maps = vec![Some(map.clone())];
-    for block in &grid.blocks {
-        let under = map::under(map, grid, block).map_err(|e| {
-            miette::miette!(help = "make a file of each part, or give them the same columns", "{source}: {e}")
-        })?;
-        if under.is_none() {
-            notes.push(format!("row {} heads another table: its rows were not taken", block.place));
-        }
-        maps.push(under);
-    }
+    let maps = maps(source, grid, map, &mut notes)?;
     let clocks = match map.columns.iter().find(|c| c.target == Id::Time as usize) {
         Some(column) => {
             let (times, remarks) = clock::times(grid, column.index, &column.unit_text)
@@ -300,28 +283,10 @@ pub fn import(source: &str, bytes: &[u8], grid: &Grid, wanted: &Wanted<'_>) -> m
     if map.time_by_rows {
         notes.push("time_s is the number of the row, a second each".into());
     }
-    let left_out = |(row, text, reason): &(u64, String, String)| Dropped {
-        row: *row,
-        column: String::new(),
-        text: text.clone(),
-        reason: reason.clone(),
-    };
-    let mut dropped: Vec<Dropped> = grid.left_out.iter().map(left_out).collect();
     let full = grid.rows.iter().rposition(|r| !is_padding(r)).map_or(0, |k| k + 1);
     let padded = grid.rows.len() - full;
-    let mut values = Vec::new();
-    for (number, row) in grid.rows.iter().enumerate() {
-        let Some(map) = &maps[row.block] else { continue };
-        if wanted.padding && number >= full {
-            let reason = "zeros at the end: room that was not filled".to_string();
-            dropped.push(Dropped { row: row.place, column: String::new(), text: "0".into(), reason });
-            continue;
-        }
-        match Values::read(grid, map, row, number, clocks.get(number).copied().flatten()) {
-            Ok(v) => values.push(v),
-            Err(why) => dropped.push(why),
-        }
-    }
+    let room_from = if wanted.padding { full } else { grid.rows.len() };
+    let (mut values, mut dropped) = rows(grid, &maps, &clocks, room_from);
     let mut series = None;
     let mut spreads = Vec::new();
     if let Some(cut) = wanted.series {
@@ -339,22 +304,9 @@ pub fn import(source: &str, bytes: &[u8], grid: &Grid, wanted: &Wanted<'_>) -> m
             "frequency_hz is missing, and the plate vibrates"
         );
     }
-    let (mut passes, candidates): (Vec<Pass>, usize) = (Vec::new(), values.len());
-    let mut taken = Vec::new();
-    for (k, value) in values.iter().enumerate() {
-        match value.pass(k as u64 + 1) {
-            Ok(mut pass) => {
-                if let Some(spread) = spreads.get(k) {
-                    spread.put(&mut pass);
-                }
-                passes.push(pass);
-                taken.push(value);
-            }
-            Err(why) => dropped.push(why),
-        }
-    }
+    let (passes, taken) = passes(&values, &spreads, &mut dropped);
     dropped.sort_by_key(|d| d.row);
-    if 2 * passes.len() < candidates.max(1) || passes.is_empty() {
+    if 2 * passes.len() < values.len().max(1) || passes.is_empty() {
         return Err(mostly_dropped(source, grid, &dropped, passes.len(), padded));
     }
     if series.is_none() {
@@ -369,17 +321,7 @@ pub fn import(source: &str, bytes: &[u8], grid: &Grid, wanted: &Wanted<'_>) -> m
         notes.extend(back);
     }
     let columns = write::columns(map, series.is_some());
-    let table = write::table(&passes, &columns)?;
-    // What is written must be what was meant: it is read back as a diagnosis would.
-    let mut back = read_passes(table.as_bytes()).into_diagnostic().wrap_err("the table that was made")?;
-    if !states_frequency {
-        back.iter_mut().zip(&passes).for_each(|(b, p)| b.frequency_hz = p.frequency_hz);
-    }
-    if back != passes {
-        miette::bail!(
-            "the table that was made does not read back as it was written: please report this file"
-        );
-    }
+    let table = written(&passes, &columns, states_frequency)?;
     let (rig, assumed) = match &wanted.rig {
         Some(text) => (text.clone(), Vec::new()),
         None => write::rig(&passes, source, wanted.tip)?,
@@ -412,6 +354,103 @@ pub fn import(source: &str, bytes: &[u8], grid: &Grid, wanted: &Wanted<'_>) -> m
         dropped,
     };
     Ok(Imported { table, rig, log })
+}
+
+/// Refuses a map that lacks columns, all at once.
+fn refuse_lacks(source: &str, grid: &Grid, wanted: &Wanted<'_>, not_taken: &[String]) -> miette::Result<()> {
+    let lacks = wanted.map.lacks(wanted.series.is_some());
+    if lacks.is_empty() {
+        return Ok(());
+    }
+    let left = if not_taken.is_empty() {
+        String::new()
+    } else {
+        format!("\ncolumns of {source} that are not taken: {}", not_taken.join(", "))
+    };
+    let across = across(grid).unwrap_or_default();
+    miette::bail!(help = format!("state it with --map and --set{left}{across}"), "{}", lacks.join("\n"));
+}
+
+/// The map of each block of the source; none of a block that is another table.
+fn maps(source: &str, grid: &Grid, map: &Map, notes: &mut Vec<String>) -> miette::Result<Vec<Option<Map>>> {
+    let mut maps = vec![Some(map.clone())];
+    for block in &grid.blocks {
+        let under = map::under(map, grid, block).map_err(|e| {
+            miette::miette!(help = "make a file of each part, or give them the same columns", "{source}: {e}")
+        })?;
+        if under.is_none() {
+            notes.push(format!("row {} heads another table: its rows were not taken", block.place));
+        }
+        maps.push(under);
+    }
+    Ok(maps)
+}
+
+/// The values of the rows, and the rows that are left out. Those from number `room_from` on are padding.
+fn rows(
+    grid: &Grid,
+    maps: &[Option<Map>],
+    clocks: &[Option<f64>],
+    room_from: usize,
+) -> (Vec<Values>, Vec<Dropped>) {
+    let left_out = |(row, text, reason): &(u64, String, String)| Dropped {
+        row: *row,
+        column: String::new(),
+        text: text.clone(),
+        reason: reason.clone(),
+    };
+    let mut dropped: Vec<Dropped> = grid.left_out.iter().map(left_out).collect();
+    let mut values = Vec::new();
+    for (number, row) in grid.rows.iter().enumerate() {
+        let Some(map) = &maps[row.block] else { continue };
+        if number >= room_from {
+            let reason = "zeros at the end: room that was not filled".to_string();
+            dropped.push(Dropped { row: row.place, column: String::new(), text: "0".into(), reason });
+            continue;
+        }
+        match Values::read(grid, map, row, number, clocks.get(number).copied().flatten()) {
+            Ok(v) => values.push(v),
+            Err(why) => dropped.push(why),
+        }
+    }
+    (values, dropped)
+}
+
+/// The passes, and the values of each; a series has the spread of each as well.
+fn passes<'a>(
+    values: &'a [Values],
+    spreads: &[Spread],
+    dropped: &mut Vec<Dropped>,
+) -> (Vec<Pass>, Vec<&'a Values>) {
+    let (mut passes, mut taken) = (Vec::new(), Vec::new());
+    for (k, value) in values.iter().enumerate() {
+        match value.pass(k as u64 + 1) {
+            Ok(mut pass) => {
+                if let Some(spread) = spreads.get(k) {
+                    spread.put(&mut pass);
+                }
+                passes.push(pass);
+                taken.push(value);
+            }
+            Err(why) => dropped.push(why),
+        }
+    }
+    (passes, taken)
+}
+
+/// The table as CSV. What is written must be what was meant: it is read back as a diagnosis would.
+fn written(passes: &[Pass], columns: &[&'static str], states_frequency: bool) -> miette::Result<String> {
+    let table = write::table(passes, columns)?;
+    let mut back = read_passes(table.as_bytes()).into_diagnostic().wrap_err("the table that was made")?;
+    if !states_frequency {
+        back.iter_mut().zip(passes).for_each(|(b, p)| b.frequency_hz = p.frequency_hz);
+    }
+    if back != passes {
+        miette::bail!(
+            "the table that was made does not read back as it was written: please report this file"
+        );
+    }
+    Ok(table)
 }
 
 /// Whether a row holds nothing but zeros.
