@@ -96,7 +96,7 @@ fn a_grating_is_rendered_and_its_record_replays_bit_for_bit() {
     let file = |name: &str| &files.iter().find(|f| f.0 == name).unwrap().1;
     let built: Replayable = serde_json::from_slice(file("loop.json")).unwrap();
     let law = Arc::new(models::prediction::SpringSlider::new(built.finger).unwrap());
-    let law = models::target::Rendering { law, target: serde_json::from_slice(file(TARGET)).unwrap() };
+    let law = models::law::Rendering { law, target: serde_json::from_slice(file(TARGET)).unwrap() };
     let wanted = rows.iter().filter(|row| row.rendered.is_some()).count();
     let replay = realtime::replay::replay(&built.config, &law, rows);
     assert!(replay.holds() && wanted > 5000, "{replay:?} {wanted}");

@@ -87,21 +87,34 @@ impl Covariate {
     }
 }
 
+/// What a covariate is where its entry does not say so.
+const LINEAR_SETTING: Covariate = Covariate {
+    name: "",
+    words: "",
+    shown: (1.0, ""),
+    range: [f64::NEG_INFINITY, f64::INFINITY],
+    from: true,
+    needed: "",
+    role: Role::Setting,
+    scale: Scale::Linear(1.0),
+    least_spread: 0.0,
+    level: None,
+    neighbourhood: None,
+    get: |_| None,
+    set: |_, _| (),
+};
+
 /// Start of the pass.
 pub static TIME: Covariate = Covariate {
     name: "time_s",
     words: "time",
     shown: (1.0, "s"),
     range: [-1e10, 1e10],
-    from: true,
     needed: "a number of seconds, at most 1e10",
     role: Role::Time,
-    scale: Scale::Linear(1.0),
-    least_spread: 0.0,
-    level: None,
-    neighbourhood: None,
     get: |c| Some(c.time_s),
     set: |c, v| c.time_s = v,
+    ..LINEAR_SETTING
 };
 
 /// Vibration amplitude, peak to peak.
@@ -110,15 +123,13 @@ pub static AMPLITUDE: Covariate = Covariate {
     words: "amplitude",
     shown: (1e6, "\u{b5}m"),
     range: [0.0, 1e-3],
-    from: true,
     needed: "a number of metres, zero to 1e-3 (peak to peak)",
-    role: Role::Setting,
     scale: Scale::LogFromZero(0.2),
-    least_spread: 0.0,
     level: Some(|v| (v * 1e9).round() as i64),
     neighbourhood: Some(|v| ((1.0 + v * 1e6).ln() / 0.02).round() as i64),
     get: |c| Some(c.amplitude.metres()),
     set: |c, v| c.amplitude = PeakToPeak::from_metres(v),
+    ..LINEAR_SETTING
 };
 
 /// Vibration frequency.
@@ -129,13 +140,12 @@ pub static FREQUENCY: Covariate = Covariate {
     range: [0.0, 1e7],
     from: false,
     needed: "a number of hertz above zero, up to 1e7",
-    role: Role::Setting,
     scale: Scale::Log,
-    least_spread: 0.0,
     level: Some(|v| v.round() as i64),
     neighbourhood: Some(|v| (v.ln() / 0.02).round() as i64),
     get: |c| Some(c.frequency_hz),
     set: |c, v| c.frequency_hz = v,
+    ..LINEAR_SETTING
 };
 
 /// Sliding speed.
@@ -144,15 +154,13 @@ pub static SPEED: Covariate = Covariate {
     words: "speed",
     shown: (1e3, "mm/s"),
     range: [0.0, 100.0],
-    from: true,
     needed: "a speed in m/s, zero to 100 (the sign is 'direction')",
-    role: Role::Setting,
     scale: Scale::Log,
-    least_spread: 0.0,
     level: Some(|v| (v.ln() * 50.0).round() as i64),
     neighbourhood: Some(|v| (v.ln() / 0.05).round() as i64),
     get: |c| Some(c.speed_m_s),
     set: |c, v| c.speed_m_s = v,
+    ..LINEAR_SETTING
 };
 
 /// Direction of sliding.
@@ -161,15 +169,11 @@ pub static DIRECTION: Covariate = Covariate {
     words: "direction",
     shown: (1.0, ""),
     range: [-1.0, 1.0],
-    from: true,
     needed: "1 or -1",
-    role: Role::Setting,
-    scale: Scale::Linear(1.0),
-    least_spread: 0.0,
     level: Some(|v| v as i64),
-    neighbourhood: None,
     get: |c| Some(c.direction.sign()),
     set: |c, v| c.direction = if v < 0.0 { Direction::Backward } else { Direction::Forward },
+    ..LINEAR_SETTING
 };
 
 /// Mean position along the plate.
@@ -178,15 +182,11 @@ pub static POSITION: Covariate = Covariate {
     words: "position",
     shown: (1e3, "mm"),
     range: [-100.0, 100.0],
-    from: true,
     needed: "a number of metres, -100 to 100",
     role: Role::Place,
-    scale: Scale::Linear(1.0),
-    least_spread: 0.0,
-    level: None,
-    neighbourhood: None,
     get: |c| Some(c.position_m),
     set: |c, v| c.position_m = v,
+    ..LINEAR_SETTING
 };
 
 /// Mean normal force.
@@ -195,9 +195,7 @@ pub static NORMAL_FORCE: Covariate = Covariate {
     words: "normal force",
     shown: (1.0, "N"),
     range: [-500.0, 500.0],
-    from: true,
     needed: "a number of newtons, -500 to 500",
-    role: Role::Setting,
     scale: Scale::Log,
     // Load is regulated: below a few per cent it carries no information, only noise.
     least_spread: 0.08,
@@ -205,6 +203,7 @@ pub static NORMAL_FORCE: Covariate = Covariate {
     neighbourhood: Some(|v| (v.ln() / 0.15).round() as i64),
     get: |c| Some(c.normal_force_n),
     set: |c, v| c.normal_force_n = v,
+    ..LINEAR_SETTING
 };
 
 /// Ambient pressure.
@@ -213,15 +212,13 @@ pub static AMBIENT_PRESSURE: Covariate = Covariate {
     words: "pressure",
     shown: (1e-3, "kPa"),
     range: [0.0, 1e7],
-    from: true,
     needed: "a pressure in Pa, zero to 1e7",
-    role: Role::Setting,
     scale: Scale::Linear(101_325.0),
-    least_spread: 0.0,
     level: Some(|v| (v / 500.0).round() as i64),
     neighbourhood: Some(|v| (v / 2000.0).round() as i64),
     get: |c| c.ambient_pressure_pa,
     set: |c, v| c.ambient_pressure_pa = Some(v),
+    ..LINEAR_SETTING
 };
 
 /// Temperature.
@@ -230,16 +227,13 @@ pub static TEMPERATURE: Covariate = Covariate {
     words: "temperature",
     shown: (1.0, "\u{b0}C"),
     range: [-273.15, 1000.0],
-    from: true,
     needed: "a temperature in degrees Celsius, -273.15 to 1000",
     role: Role::Climate,
-    scale: Scale::Linear(1.0),
     // The resolution of a thermometer at the plate.
     least_spread: 0.1,
-    level: None,
-    neighbourhood: None,
     get: |c| c.temperature_c,
     set: |c, v| c.temperature_c = Some(v),
+    ..LINEAR_SETTING
 };
 
 /// Relative humidity.
@@ -248,16 +242,13 @@ pub static RELATIVE_HUMIDITY: Covariate = Covariate {
     words: "relative humidity",
     shown: (1.0, "%"),
     range: [0.0, 100.0],
-    from: true,
     needed: "a percentage, 0 to 100",
     role: Role::Climate,
-    scale: Scale::Linear(1.0),
     // The repeatability of a capacitive hygrometer.
     least_spread: 2.0,
-    level: None,
-    neighbourhood: None,
     get: |c| c.relative_humidity_pct,
     set: |c, v| c.relative_humidity_pct = Some(v),
+    ..LINEAR_SETTING
 };
 
 /// Columns that every point table has, in its order.

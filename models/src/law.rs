@@ -1,4 +1,4 @@
-//! Laws by name, and laws from files with the hash by which records and verdicts call them.
+//! Laws by name, laws from files with the hash by which records and verdicts call them, a law with a target.
 
 use crate::condition::{Condition, OutOfDomain};
 use crate::finger::Finger;
@@ -6,6 +6,7 @@ use crate::prediction::{
     EmpiricalPsi, FrictionModel, Prediction, RelativeFriction, SpringSlider, as_its_law,
 };
 use crate::surrogate::Surrogate;
+use crate::target::Target;
 use serde::{Deserialize, Serialize};
 use std::sync::Arc;
 
@@ -74,5 +75,33 @@ impl FrictionModel for Named {
 
     fn sha256(&self) -> Option<&str> {
         Some(&self.sha256)
+    }
+}
+
+/// A law with the target that a loop renders by it.
+pub struct Rendering {
+    /// The law.
+    pub law: Arc<dyn FrictionModel>,
+    /// The target.
+    pub target: Target,
+}
+
+impl FrictionModel for Rendering {
+    fn name(&self) -> &str {
+        self.law.name()
+    }
+
+    as_its_law!();
+
+    fn sha256(&self) -> Option<&str> {
+        self.law.sha256()
+    }
+
+    fn base(&self) -> Option<&dyn FrictionModel> {
+        self.law.base()
+    }
+
+    fn target(&self) -> Option<&Target> {
+        Some(&self.target)
     }
 }

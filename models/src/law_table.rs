@@ -6,6 +6,7 @@
 pub mod grid;
 
 use crate::condition::{Condition, OutOfDomain};
+use crate::covariate::{self, Covariate};
 use crate::prediction::{FrictionModel, Prediction, Regime, Validity};
 use crate::quantity::PeakToPeak;
 
@@ -18,19 +19,22 @@ pub struct Variable {
     pub range: [f64; 2],
     /// What is accepted, in words.
     pub needed: &'static str,
-    get: fn(&Condition) -> f64,
-    set: fn(&mut Condition, f64),
+    /// Where it is read; none for mu_0.
+    covariate: Option<&'static Covariate>,
 }
 
 impl Variable {
     /// Its value at a condition.
     pub fn of(&self, condition: &Condition) -> f64 {
-        (self.get)(condition)
+        self.covariate.map_or(condition.mu0, |c| c.of(condition).unwrap_or(f64::NAN))
     }
 
     /// Gives a condition this value.
     pub fn put(&self, condition: &mut Condition, value: f64) {
-        (self.set)(condition, value);
+        match self.covariate {
+            Some(c) => c.put(condition, value),
+            None => condition.mu0 = value,
+        }
     }
 
     /// Whether a law table can have this value.
@@ -49,70 +53,20 @@ pub const OF_LAWS: usize = 5;
 
 /// The variables in their order.
 pub static VARIABLES: [Variable; 9] = [
-    Variable {
-        name: "amplitude_pp_m",
-        range: [0.0, 1e-3],
-        needed: "metres peak to peak, 0 to 1e-3",
-        get: |c| c.amplitude.metres(),
-        set: |c, v| c.amplitude = PeakToPeak::from_metres(v),
-    },
-    Variable {
-        name: "frequency_hz",
-        range: [1e3, 1e7],
-        needed: "hertz, 1e3 to 1e7",
-        get: |c| c.frequency_hz,
-        set: |c, v| c.frequency_hz = v,
-    },
-    Variable {
-        name: "speed_m_s",
-        range: [0.0, 10.0],
-        needed: "m/s, 0 to 10",
-        get: |c| c.speed_m_s,
-        set: |c, v| c.speed_m_s = v,
-    },
-    Variable {
-        name: "normal_force_n",
-        range: [1e-6, 100.0],
-        needed: "newtons, 1e-6 to 100",
-        get: |c| c.normal_force_n,
-        set: |c, v| c.normal_force_n = v,
-    },
-    Variable {
-        name: "mu0",
-        range: [1e-3, 10.0],
-        needed: "a number, 1e-3 to 10",
-        get: |c| c.mu0,
-        set: |c, v| c.mu0 = v,
-    },
-    Variable {
-        name: "temperature_c",
-        range: [-50.0, 150.0],
-        needed: "degrees Celsius, -50 to 150",
-        get: |c| c.temperature_c.unwrap_or(f64::NAN),
-        set: |c, v| c.temperature_c = Some(v),
-    },
-    Variable {
-        name: "ambient_pressure_pa",
-        range: [1.0, 1e6],
-        needed: "pascals, 1 to 1e6",
-        get: |c| c.ambient_pressure_pa.unwrap_or(f64::NAN),
-        set: |c, v| c.ambient_pressure_pa = Some(v),
-    },
-    Variable {
-        name: "position_m",
-        range: [-1.0, 1.0],
-        needed: "metres, -1 to 1",
-        get: |c| c.position_m,
-        set: |c, v| c.position_m = v,
-    },
-    Variable {
-        name: "time_s",
-        range: [0.0, 1e7],
-        needed: "seconds, 0 to 1e7",
-        get: |c| c.time_s,
-        set: |c, v| c.time_s = v,
-    },
+    variable(&covariate::AMPLITUDE, [0.0, 1e-3], "metres peak to peak, 0 to 1e-3"),
+    variable(&covariate::FREQUENCY, [1e3, 1e7], "hertz, 1e3 to 1e7"),
+    variable(&covariate::SPEED, [0.0, 10.0], "m/s, 0 to 10"),
+    variable(&covariate::NORMAL_FORCE, [1e-6, 100.0], "newtons, 1e-6 to 100"),
+    Variable { name: "mu0", range: [1e-3, 10.0], needed: "a number, 1e-3 to 10", covariate: None },
+    variable(&covariate::TEMPERATURE, [-50.0, 150.0], "degrees Celsius, -50 to 150"),
+    variable(&covariate::AMBIENT_PRESSURE, [1.0, 1e6], "pascals, 1 to 1e6"),
+    variable(&covariate::POSITION, [-1.0, 1.0], "metres, -1 to 1"),
+    variable(&covariate::TIME, [0.0, 1e7], "seconds, 0 to 1e7"),
 ];
+
+const fn variable(c: &'static Covariate, range: [f64; 2], needed: &'static str) -> Variable {
+    Variable { name: c.name, range, needed, covariate: Some(c) }
+}
 
 /// What a table answers, and over what.
 pub struct Answers {

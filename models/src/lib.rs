@@ -16,7 +16,7 @@
 //! | [`ridge`] | the finite element model of section 3 |
 //! | [`surrogate`], [`inverse`] | a table of the ridge that is quick to read; the amplitude for a wanted friction |
 //! | [`target`] | a wanted friction over position |
-//! | [`prediction`] | what every friction law answers |
+//! | [`prediction`], `regime` | what every friction law answers |
 //! | [`law`], [`law_table`], [`sparse`] | laws by name; own laws as tables; the surrogate of `model adapt` |
 //! | [`pass`] | the data vocabulary: passes, the point table |
 //! | [`rig_file`] | `rig.toml`: finger, repeatability, what certificates leave open |
@@ -52,6 +52,7 @@ pub mod psi_star;
 pub mod quantity;
 pub mod reading;
 pub mod reading_evidence;
+mod regime;
 pub mod ridge;
 pub mod rig_file;
 pub mod root;

@@ -5,20 +5,9 @@ use crate::finger::Finger;
 use crate::psi::{self, PsiEq17};
 use crate::quantity::PeakToPeak;
 use crate::reading::Reading;
+pub use crate::regime::Regime;
 use crate::spring_slider;
 use serde::{Deserialize, Serialize};
-
-/// How finger and plate meet over a cycle.
-#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
-#[serde(rename_all = "snake_case")]
-pub enum Regime {
-    /// The reaction force never reaches zero: `w/2 <= F_n/k_n`.
-    FullContact,
-    /// Contact is lost and the slider sticks during part of it.
-    Intermittent,
-    /// Contact is lost and the slider never sticks: `mu' = 1`.
-    FullSlip,
-}
 
 /// Whether a prediction rests on the conditions that its law was made for.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]

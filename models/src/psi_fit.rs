@@ -45,13 +45,9 @@ fn least_squares<'a>(points: impl Iterator<Item = &'a (usize, f64, f64)> + Clone
             .sum()
     };
     let place = |k: usize| 0.01 * 10_f64.powf(k as f64 / 50.0);
-    let (mut low, mut high) =
-        (0..200).map(|k| (place(k), place(k + 1))).find(|(a, b)| slope(*a) < 0.0 && slope(*b) >= 0.0)?;
-    for _ in 0..100 {
-        let middle = 0.5 * (low + high);
-        if slope(middle) < 0.0 { low = middle } else { high = middle }
-    }
-    Some(0.5 * (low + high))
+    let mut cells = (0..200).map(|k| [place(k), place(k + 1)]);
+    let cell = cells.find(|[a, b]| slope(*a) < 0.0 && slope(*b) >= 0.0)?;
+    Some(crate::root::bisection(cell, 100, |star| slope(star) < 0.0))
 }
 
 #[cfg(test)]

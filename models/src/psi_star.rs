@@ -26,7 +26,7 @@ use serde::{Deserialize, Serialize};
 use std::fmt;
 
 /// `Psi` of the true stroke at which passes count: about one, where the readings differ most. A condition at
-/// an end has half its weight. at an end has half its weight.
+/// an end has half its weight.
 pub const PSI_RANGE: [f64; 2] = [0.4, 4.0];
 /// Factor about each end over which the weight goes from all to nothing: a `mu_0` with noise then moves no
 /// condition in or out at once.
@@ -236,15 +236,11 @@ impl Means {
     /// `ln Psi*` where the score is nothing. Below what every condition gives by hand the score is negative,
     /// above it positive.
     fn centre(&self, mu0: f64) -> Option<f64> {
-        let [mut low, mut high] = SEARCH.map(f64::ln);
-        if !(self.score(low, mu0) < 0.0 && self.score(high, mu0) > 0.0) {
+        let ends = SEARCH.map(f64::ln);
+        if !(self.score(ends[0], mu0) < 0.0 && self.score(ends[1], mu0) > 0.0) {
             return None;
         }
-        for _ in 0..60 {
-            let middle = 0.5 * (low + high);
-            if self.score(middle, mu0) < 0.0 { low = middle } else { high = middle }
-        }
-        Some(0.5 * (low + high))
+        Some(crate::root::bisection(ends, 60, |star| self.score(star, mu0) < 0.0))
     }
 
     /// Half the slope of the weighted squares in `ln Psi*`.

@@ -7,7 +7,6 @@
 
 use crate::psi::{PSI_STAR, PSI_STAR_UNCERTAINTY};
 use crate::quantity::PeakToPeak;
-use crate::ridge::RidgeCase;
 use serde::{Deserialize, Serialize};
 
 /// A reading of the paper's `w`.
@@ -46,11 +45,6 @@ impl Reading {
     /// What the paper calls `w` where the plate moves so, in m.
     pub fn w_m(self, motion: PeakToPeak) -> f64 {
         motion.metres() / self.strokes()
-    }
-
-    /// The same case at what the paper calls `w_m`, in m.
-    pub fn at(self, case: RidgeCase, w_m: f64) -> RidgeCase {
-        case.with_amplitude_pp_m(self.motion(w_m).metres())
     }
 
     /// Its name on the command line.

@@ -40,44 +40,97 @@ impl std::fmt::Display for CertificateKind {
     }
 }
 
-/// A quantity whose error an outside calibration bounds: a key of `[calibration]`.
-#[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord, Hash, Serialize)]
-#[serde(rename_all = "snake_case")]
-pub enum CertifiedKey {
-    /// Gain of the vibration amplitude.
-    AmplitudeGain,
-    /// Gain of the lateral force.
-    LateralGain,
-    /// Gain of the normal force.
-    NormalGain,
-    /// Gain of the sliding speed.
-    SpeedGain,
-    /// Zero of the lateral force.
-    LateralOffset,
-    /// Zero of the normal force.
-    NormalOffset,
-    /// Direction of the plate in the sensor's frame.
-    Tilt,
-    /// Share of the normal force that is read as lateral force.
-    Crosstalk,
-    /// Share of the lateral force that is read as normal force.
-    CrosstalkOntoNormal,
+/// Declares what a certificate can bound: the key, its words, the kind of certificate that states it; its entry
+/// in `[calibration]`, and the largest standard uncertainty that can be meant.
+macro_rules! certified_keys {
+    ($(
+        $(#[$about:meta])* $key:ident, $words:literal, $kind:expr;
+        $(#[$of:meta])* $sd:ident up to $largest:literal;
+    )*) => {
+        /// A quantity whose error an outside calibration bounds: a key of `[calibration]`.
+        #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord, Hash, Serialize)]
+        #[serde(rename_all = "snake_case")]
+        pub enum CertifiedKey {
+            $($(#[$about])* $key,)*
+        }
+
+        /// Standard uncertainties that outside calibrations leave; missing where there is no certificate.
+        #[derive(Clone, Debug, PartialEq, Default, Serialize, Deserialize, JsonSchema)]
+        #[serde(deny_unknown_fields)]
+        pub struct Calibration {
+            $(
+                $(#[$of])*
+                #[serde(default, skip_serializing_if = "Option::is_none")]
+                pub $sd: Option<f64>,
+            )*
+            /// File name of each certificate that says so, by its kind.
+            #[serde(default, skip_serializing_if = "BTreeMap::is_empty")]
+            pub certificates: BTreeMap<CertificateKind, String>,
+        }
+
+        impl CertifiedKey {
+            /// Every key.
+            pub const ALL: [CertifiedKey; 9] = [$(CertifiedKey::$key),*];
+
+            const fn facts(self) -> (&'static str, &'static str, Option<CertificateKind>, f64) {
+                match self {
+                    $(CertifiedKey::$key => (stringify!($sd), $words, $kind, $largest),)*
+                }
+            }
+        }
+
+        impl Calibration {
+            fn stated(&self, key: CertifiedKey) -> Option<f64> {
+                match key {
+                    $(CertifiedKey::$key => self.$sd,)*
+                }
+            }
+        }
+    };
 }
 
-impl CertifiedKey {
-    /// Every key.
-    pub const ALL: [CertifiedKey; 9] = [
-        CertifiedKey::AmplitudeGain,
-        CertifiedKey::LateralGain,
-        CertifiedKey::NormalGain,
-        CertifiedKey::SpeedGain,
-        CertifiedKey::LateralOffset,
-        CertifiedKey::NormalOffset,
-        CertifiedKey::Tilt,
-        CertifiedKey::Crosstalk,
-        CertifiedKey::CrosstalkOntoNormal,
-    ];
+certified_keys! {
+    /// Gain of the vibration amplitude.
+    AmplitudeGain, "gain of the amplitude", Some(CertificateKind::Amplitude);
+    /// Of the amplitude's gain (vibrometer), relative, 0 to 1.
+    amplitude_gain_sd up to 1.0;
+    /// Gain of the lateral force.
+    LateralGain, "gain of the lateral force", FORCE;
+    /// Of the lateral force's gain (dead weight), relative, 0 to 1.
+    lateral_gain_sd up to 1.0;
+    /// Gain of the normal force.
+    NormalGain, "gain of the normal force", FORCE;
+    /// Of the normal force's gain (dead weight), relative, 0 to 1.
+    normal_gain_sd up to 1.0;
+    /// Gain of the sliding speed.
+    SpeedGain, "gain of the sliding speed", None;
+    /// Of the speed's gain (encoder, or the stroke against a clock), relative, 0 to 1.
+    speed_gain_sd up to 1.0;
+    /// Zero of the lateral force.
+    LateralOffset, "zero of the lateral force", FORCE;
+    /// Of the lateral force's zero, N, 0 to 100.
+    lateral_offset_sd_n up to 100.0;
+    /// Zero of the normal force.
+    NormalOffset, "zero of the normal force", FORCE;
+    /// Of the normal force's zero, N, 0 to 100.
+    normal_offset_sd_n up to 100.0;
+    /// Direction of the plate in the sensor's frame.
+    Tilt, "level of the plate in the sensor's frame", FORCE;
+    /// Of the level of the plate in the sensor's frame (the direction of the normal pull), rad, 0 to 1.
+    tilt_sd_rad up to 1.0;
+    /// Share of the normal force that is read as lateral force.
+    Crosstalk, "cross-talk of the normal onto the lateral force", FORCE;
+    /// Of the cross-talk of normal onto lateral force, N/N, 0 to 1. It also stands for the other one where
+    /// `crosstalk_onto_normal_sd` does not state that apart.
+    crosstalk_sd up to 1.0;
+    /// Share of the lateral force that is read as normal force.
+    CrosstalkOntoNormal, "cross-talk of the lateral onto the normal force", FORCE;
+    /// Of the cross-talk of lateral onto normal force, N/N, 0 to 1.
+    crosstalk_onto_normal_sd up to 1.0;
+}
+const FORCE: Option<CertificateKind> = Some(CertificateKind::Force);
 
+impl CertifiedKey {
     /// The key in `[calibration]`.
     pub const fn name(self) -> &'static str {
         self.facts().0
@@ -96,27 +149,6 @@ impl CertifiedKey {
     /// Largest standard uncertainty that can be meant, in the key's unit.
     pub const fn largest(self) -> f64 {
         self.facts().3
-    }
-
-    const fn facts(self) -> (&'static str, &'static str, Option<CertificateKind>, f64) {
-        const FORCE: Option<CertificateKind> = Some(CertificateKind::Force);
-        match self {
-            CertifiedKey::AmplitudeGain => {
-                ("amplitude_gain_sd", "gain of the amplitude", Some(CertificateKind::Amplitude), 1.0)
-            }
-            CertifiedKey::LateralGain => ("lateral_gain_sd", "gain of the lateral force", FORCE, 1.0),
-            CertifiedKey::NormalGain => ("normal_gain_sd", "gain of the normal force", FORCE, 1.0),
-            CertifiedKey::SpeedGain => ("speed_gain_sd", "gain of the sliding speed", None, 1.0),
-            CertifiedKey::LateralOffset => ("lateral_offset_sd_n", "zero of the lateral force", FORCE, 100.0),
-            CertifiedKey::NormalOffset => ("normal_offset_sd_n", "zero of the normal force", FORCE, 100.0),
-            CertifiedKey::Tilt => ("tilt_sd_rad", "level of the plate in the sensor's frame", FORCE, 1.0),
-            CertifiedKey::Crosstalk => {
-                ("crosstalk_sd", "cross-talk of the normal onto the lateral force", FORCE, 1.0)
-            }
-            CertifiedKey::CrosstalkOntoNormal => {
-                ("crosstalk_onto_normal_sd", "cross-talk of the lateral onto the normal force", FORCE, 1.0)
-            }
-        }
     }
 }
 
@@ -137,57 +169,11 @@ impl Default for PassNoise {
     }
 }
 
-/// Standard uncertainties that outside calibrations leave; missing where there is no certificate.
-#[derive(Clone, Debug, PartialEq, Default, Serialize, Deserialize, JsonSchema)]
-#[serde(deny_unknown_fields)]
-pub struct Calibration {
-    /// Of the amplitude's gain (vibrometer), relative, 0 to 1.
-    #[serde(default, skip_serializing_if = "Option::is_none")]
-    pub amplitude_gain_sd: Option<f64>,
-    /// Of the lateral force's gain (dead weight), relative, 0 to 1.
-    #[serde(default, skip_serializing_if = "Option::is_none")]
-    pub lateral_gain_sd: Option<f64>,
-    /// Of the normal force's gain (dead weight), relative, 0 to 1.
-    #[serde(default, skip_serializing_if = "Option::is_none")]
-    pub normal_gain_sd: Option<f64>,
-    /// Of the speed's gain (encoder, or the stroke against a clock), relative, 0 to 1.
-    #[serde(default, skip_serializing_if = "Option::is_none")]
-    pub speed_gain_sd: Option<f64>,
-    /// Of the lateral force's zero, N, 0 to 100.
-    #[serde(default, skip_serializing_if = "Option::is_none")]
-    pub lateral_offset_sd_n: Option<f64>,
-    /// Of the normal force's zero, N, 0 to 100.
-    #[serde(default, skip_serializing_if = "Option::is_none")]
-    pub normal_offset_sd_n: Option<f64>,
-    /// Of the level of the plate in the sensor's frame (the direction of the normal pull), rad, 0 to 1.
-    #[serde(default, skip_serializing_if = "Option::is_none")]
-    pub tilt_sd_rad: Option<f64>,
-    /// Of the cross-talk of normal onto lateral force, N/N, 0 to 1. It also stands for the other one where
-    /// `crosstalk_onto_normal_sd` does not state that apart.
-    #[serde(default, skip_serializing_if = "Option::is_none")]
-    pub crosstalk_sd: Option<f64>,
-    /// Of the cross-talk of lateral onto normal force, N/N, 0 to 1.
-    #[serde(default, skip_serializing_if = "Option::is_none")]
-    pub crosstalk_onto_normal_sd: Option<f64>,
-    /// File name of each certificate that says so, by its kind.
-    #[serde(default, skip_serializing_if = "BTreeMap::is_empty")]
-    pub certificates: BTreeMap<CertificateKind, String>,
-}
-
 impl Calibration {
     /// The standard uncertainty that bounds a quantity, in the key's unit; `None` without a certificate.
     pub fn sd(&self, key: CertifiedKey) -> Option<f64> {
-        match key {
-            CertifiedKey::AmplitudeGain => self.amplitude_gain_sd,
-            CertifiedKey::LateralGain => self.lateral_gain_sd,
-            CertifiedKey::NormalGain => self.normal_gain_sd,
-            CertifiedKey::SpeedGain => self.speed_gain_sd,
-            CertifiedKey::LateralOffset => self.lateral_offset_sd_n,
-            CertifiedKey::NormalOffset => self.normal_offset_sd_n,
-            CertifiedKey::Tilt => self.tilt_sd_rad,
-            CertifiedKey::Crosstalk => self.crosstalk_sd,
-            CertifiedKey::CrosstalkOntoNormal => self.crosstalk_onto_normal_sd.or(self.crosstalk_sd),
-        }
+        let other = (key == CertifiedKey::CrosstalkOntoNormal).then_some(CertifiedKey::Crosstalk);
+        self.stated(key).or_else(|| self.stated(other?))
     }
 
     /// The certificate behind a key for people, as in 'force certificate (cell-7.toml)'. A quantity that no

@@ -108,6 +108,48 @@ pub fn newton_between(
     x
 }
 
+/// The bracket after so many halvings: where `below` holds in the middle, the root lies above it.
+pub fn halved([mut low, mut high]: [f64; 2], times: u32, mut below: impl FnMut(f64) -> bool) -> [f64; 2] {
+    for _ in 0..times {
+        let middle = 0.5 * (low + high);
+        if below(middle) { low = middle } else { high = middle }
+    }
+    [low, high]
+}
+
+/// The middle of the bracket after so many halvings: see [`halved`].
+pub fn bisection(ends: [f64; 2], times: u32, below: impl FnMut(f64) -> bool) -> f64 {
+    let [low, high] = halved(ends, times, below);
+    0.5 * (low + high)
+}
+
+/// The root in a bracket by Newton's rule from `start`. `look` gives at a place whether the root lies below it and
+/// where the rule leads; the middle stands for a place outside of the bracket. It ends with a step shorter than
+/// `close`, which depends on the place before it.
+pub fn newton_or_half(
+    [mut low, mut high]: [f64; 2],
+    start: f64,
+    close: impl Fn(f64) -> f64,
+    mut look: impl FnMut(f64) -> (bool, f64),
+) -> f64 {
+    let mut x = start;
+    for _ in 0..60 {
+        let (above, to) = look(x);
+        if above {
+            high = x
+        } else {
+            low = x
+        }
+        let next = if to > low && to < high { to } else { 0.5 * (low + high) };
+        let found = (next - x).abs() < close(x);
+        x = next;
+        if found {
+            break;
+        }
+    }
+    x
+}
+
 /// The root of an `f` that falls through zero between the ends, by secants within the bracket, from `start`
 /// and then from `start + f(start)`: the next value where `f` is the change that a map makes. It ends where
 /// `f`, or the bracket, is below `settled`; the root is where `f` was evaluated last.

@@ -18,8 +18,8 @@ mod stretch;
 
 use crate::condition::{Condition, OutOfDomain};
 use crate::finger::Finger;
-use crate::prediction::Regime;
 use crate::quantity::PeakToPeak;
+use crate::regime::Regime;
 use crate::root;
 pub use inverse::amplitude_for;
 use std::f64::consts::PI;

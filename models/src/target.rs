@@ -1,9 +1,6 @@
-//! A wanted friction over position, and a law together with it: what a loop renders.
+//! A wanted friction over position: what a loop renders.
 
-use crate::condition::{Condition, OutOfDomain};
-use crate::prediction::{FrictionModel, Prediction, RelativeFriction, as_its_law};
 use serde::{Deserialize, Serialize};
-use std::sync::Arc;
 
 /// Wanted `mu'` over the position along the stroke: values on an even grid, read linearly between them.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
@@ -58,34 +55,6 @@ impl Target {
     /// First and last position in m.
     pub fn span_m(&self) -> [f64; 2] {
         [self.start_m, self.start_m + self.step_m * self.mu_relative.len().saturating_sub(1) as f64]
-    }
-}
-
-/// A law with the target that a loop renders by it.
-pub struct Rendering {
-    /// The law.
-    pub law: Arc<dyn FrictionModel>,
-    /// The target.
-    pub target: Target,
-}
-
-impl FrictionModel for Rendering {
-    fn name(&self) -> &str {
-        self.law.name()
-    }
-
-    as_its_law!();
-
-    fn sha256(&self) -> Option<&str> {
-        self.law.sha256()
-    }
-
-    fn base(&self) -> Option<&dyn FrictionModel> {
-        self.law.base()
-    }
-
-    fn target(&self) -> Option<&Target> {
-        Some(&self.target)
     }
 }
 

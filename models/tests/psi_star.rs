@@ -25,7 +25,7 @@ fn psi_star<const N: usize>(base: RidgeCase, reading: Reading, shares: [f64; N])
         .par_iter()
         .map(|p| {
             let w_m = p.case.amplitude.metres();
-            let case = reading.at(p.case, w_m);
+            let case = p.case.at_w(reading, w_m);
             let own = run(&case, &RunSettings::default()).expect("runs");
             let place = Panel::ALL.iter().position(|panel| *panel == p.panel).unwrap_or(0);
             let curve = 4 * place + p.panel.values().iter().position(|v| *v == p.value).unwrap_or(0);

@@ -101,7 +101,9 @@ fn hertz_pressure_under_the_tip() {
         ..RidgeGeometry::TABLE_1
     };
     let star = material.young_modulus_pa / (1.0 - 0.33 * 0.33);
-    let (load, radius) = (3.5, geometry.tip_radius_m());
+    // Of a parabola's tip.
+    let radius = (0.5 * geometry.ridge_width_m).powi(2) / (2.0 * geometry.ridge_height_m);
+    let load = 3.5;
     let (p0, b) = (
         (load * star / (std::f64::consts::PI * radius)).sqrt(),
         (4.0 * load * radius / (std::f64::consts::PI * star)).sqrt(),

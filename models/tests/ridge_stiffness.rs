@@ -93,7 +93,8 @@ fn the_ridges_tip_is_hertzian() {
         ..RidgeCase::paper()
     };
     let reduced = 28.3e6 / (1.0 - 0.33 * 0.33);
-    let radius = case.geometry.tip_radius_m();
+    // Of a parabola's tip.
+    let radius = (0.5 * case.geometry.ridge_width_m).powi(2) / (2.0 * case.geometry.ridge_height_m);
     let found = [7.0, 28.0].map(|load| of_case(&case, load, HeldAt::Top).expect("stiffness"));
     for s in &found {
         let half = (4.0 * s.line_load_n_m * radius / (PI * reduced)).sqrt();

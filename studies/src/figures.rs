@@ -43,7 +43,7 @@ impl Study {
         fig_9_at(self.base, self.w_m)
             .into_iter()
             .filter(|p| !at_rest || !matches!(p.panel, Panel::Speed | Panel::Mu0))
-            .map(|p| StudyPoint { case: self.reading.at(p.case, p.case.amplitude.metres()), ..p })
+            .map(|p| StudyPoint { case: p.case.at_w(self.reading, p.case.amplitude.metres()), ..p })
             .collect()
     }
 
@@ -114,8 +114,9 @@ pub fn passing(curve: &[(f64, f64)], level: f64) -> String {
 
 /// Fig. 4: phase shift against amplitude, at rest as measured.
 pub fn phase_shift(base: RidgeCase, out: &Path, reading: Reading) -> miette::Result<Reproduced> {
-    let at =
-        |young_modulus_pa: f64, w: f64| reading.at(RidgeCase { young_modulus_pa, speed_m_s: 0.0, ..base }, w);
+    let at = |young_modulus_pa: f64, w: f64| {
+        RidgeCase { young_modulus_pa, speed_m_s: 0.0, ..base }.at_w(reading, w)
+    };
     let moduli = || MOIST_PA.into_iter().chain(DRY_PA);
     let cases = moduli().flat_map(|e| FIG_4_AMPLITUDES_M.map(|w| at(e, w)));
     let (results, failed) = store::complete(out, cases)?;
@@ -163,7 +164,7 @@ pub fn phase_shift(base: RidgeCase, out: &Path, reading: Reading) -> miette::Res
 
 /// Fig. 5: velocities of plate and skin, dry, 1.35 um, at rest.
 pub fn velocities(base: RidgeCase, reading: Reading) -> miette::Result<Reproduced> {
-    let case = reading.at(RidgeCase { young_modulus_pa: 202.4e6, speed_m_s: 0.0, ..base }, 1.35e-6);
+    let case = RidgeCase { young_modulus_pa: 202.4e6, speed_m_s: 0.0, ..base }.at_w(reading, 1.35e-6);
     let result = run(&case)?;
     let skin = &result.mean_cycle.skin_velocity;
     let n = skin.len();
@@ -222,7 +223,7 @@ pub fn loading(base: RidgeCase) -> miette::Result<Reproduced> {
 pub fn reaction_force(base: RidgeCase, reading: Reading) -> miette::Result<Reproduced> {
     let (mut series, mut lines) = (Vec::new(), Vec::new());
     for w in [0.1, 1.0, 2.0] {
-        let case = reading.at(base, w * 1e-6);
+        let case = base.at_w(reading, w * 1e-6);
         let result = run(&case)?;
         let scale = case.finger_per_ridge_m();
         series.push(Series::line(format!("{w} \u{b5}m"), trace(&result.mean_cycle.normal, 3, scale)));
@@ -249,7 +250,7 @@ pub fn reaction_force(base: RidgeCase, reading: Reading) -> miette::Result<Repro
 
 /// Fig. 8: reaction, Coulomb's limit and lateral force at 1.35 um.
 pub fn lateral_force(base: RidgeCase, reading: Reading) -> miette::Result<Reproduced> {
-    let case = reading.at(base, 1.35e-6);
+    let case = base.at_w(reading, 1.35e-6);
     let result = run(&case)?;
     let scale = case.finger_per_ridge_m();
     let Cycle { normal, lateral, .. } = &result.mean_cycle;

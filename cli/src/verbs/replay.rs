@@ -2,8 +2,8 @@
 
 use super::prelude::*;
 use models::law::BuiltIn;
+use models::law::Rendering;
 use models::prediction::FrictionModel;
-use models::target::Rendering;
 use realtime::recorder::{CYCLES, Entry, Integrity, Reader, inspect};
 use realtime::replay::{Replay, replay};
 use runs::run_dir::{missing_records, records_in};

@@ -4,6 +4,7 @@
 use super::{FrictionRule, Material, Plate, RidgeError, RidgeGeometry, RidgeMesh, Strain};
 use crate::condition::Condition;
 use crate::quantity::PeakToPeak;
+use crate::reading::Reading;
 use serde::{Deserialize, Serialize};
 
 /// Mean pressure over the fingertip's gross contact at 0.25 N, Pa: Hertz with a radius of 7.5 mm and a
@@ -113,6 +114,11 @@ impl RidgeCase {
         RidgeCase { amplitude: PeakToPeak::from_metres(metres), ..self }
     }
 
+    /// The same at what the paper calls `w_m`, in m.
+    pub fn at_w(self, reading: Reading, w_m: f64) -> Self {
+        RidgeCase { amplitude: reading.motion(w_m), ..self }
+    }
+
     /// Line load on the ridge in N per metre of depth.
     pub fn line_load_n_m(&self) -> f64 {
         self.mean_pressure_pa * self.geometry.ridge_width_m
@@ -169,7 +175,7 @@ impl RidgeCase {
             if value >= low && value <= high {
                 return Ok(());
             }
-            Err(RidgeError::Input { what: what.into(), value, range: format!("{low} to {high}") })
+            Err(RidgeError::input(what, value, format!("{low} to {high}")))
         };
         within("amplitude_pp_m", self.amplitude.metres(), 0.0, 50e-6)?;
         within("frequency_hz", self.frequency_hz, 1e3, 1e6)?;

@@ -47,18 +47,10 @@ impl Plate {
     /// `penalty`: spring of each surface node, N/m per metre of depth (zero: the node never touches).
     pub fn new(penalty: Vec<f64>, rule: FrictionRule, mu0: f64) -> Result<Plate, RidgeError> {
         if !(0.0..=10.0).contains(&mu0) {
-            return Err(RidgeError::Input {
-                what: "coefficient of friction".into(),
-                value: mu0,
-                range: "0 to 10".into(),
-            });
+            return Err(RidgeError::input("coefficient of friction", mu0, "0 to 10"));
         }
         if let Some(bad) = penalty.iter().find(|k| !(**k >= 0.0 && k.is_finite())) {
-            return Err(RidgeError::Input {
-                what: "contact penalty in Pa".into(),
-                value: *bad,
-                range: "0 or above".into(),
-            });
+            return Err(RidgeError::input("contact penalty in Pa", *bad, "0 or above"));
         }
         let n = penalty.len();
         let along = penalty.clone();
@@ -71,20 +63,15 @@ impl Plate {
             let along = self.penalty.iter().map(|k| k * ratio).collect();
             return Ok(Plate { along, ..self });
         }
-        let range = "above 0, up to 1".into();
-        Err(RidgeError::Input { what: "tangential penalty ratio".into(), value: ratio, range })
+        Err(RidgeError::input("tangential penalty ratio", ratio, "above 0, up to 1"))
     }
 
     /// The same with a layer on the plate, in series with the springs along it: of shear traction over slip `pa_per_m` (Pa/m, above 0),
     /// at nodes that stand for `width_m` each. Unlike a node's spring it is the same contact on every mesh.
     pub fn layered(self, pa_per_m: f64, width_m: &[f64]) -> Result<Plate, RidgeError> {
         if !(pa_per_m > 0.0 && pa_per_m.is_finite()) || width_m.len() < self.along.len() {
-            let range = "above 0 and finite, with a width for each node".into();
-            return Err(RidgeError::Input {
-                what: "tangential stiffness in Pa/m".into(),
-                value: pa_per_m,
-                range,
-            });
+            let range = "above 0 and finite, with a width for each node";
+            return Err(RidgeError::input("tangential stiffness in Pa/m", pa_per_m, range));
         }
         let series =
             |(k, w): (&f64, &f64)| if *k > 0.0 { 1.0 / (1.0 / k + 1.0 / (pa_per_m * w)) } else { 0.0 };

@@ -98,34 +98,28 @@ impl<S: Simd> Lanes<S> {
     }
 }
 
-impl<S: Simd> Add for Lanes<S> {
-    type Output = Self;
-    #[inline(always)]
-    fn add(self, b: Self) -> Self {
-        Lanes { simd: self.simd, v: self.simd.add_f64s(self.v, b.v) }
-    }
+macro_rules! operators {
+    ($($operator:ident $method:ident $instruction:ident;)*) => {
+        $(impl<S: Simd> $operator for Lanes<S> {
+            type Output = Self;
+            #[inline(always)]
+            fn $method(self, b: Self) -> Self {
+                Lanes { simd: self.simd, v: self.simd.$instruction(self.v, b.v) }
+            }
+        })*
+    };
+}
+
+operators! {
+    Add add add_f64s;
+    Sub sub sub_f64s;
+    Mul mul mul_f64s;
 }
 
 impl<S: Simd> AddAssign for Lanes<S> {
     #[inline(always)]
     fn add_assign(&mut self, b: Self) {
         *self = *self + b;
-    }
-}
-
-impl<S: Simd> Sub for Lanes<S> {
-    type Output = Self;
-    #[inline(always)]
-    fn sub(self, b: Self) -> Self {
-        Lanes { simd: self.simd, v: self.simd.sub_f64s(self.v, b.v) }
-    }
-}
-
-impl<S: Simd> Mul for Lanes<S> {
-    type Output = Self;
-    #[inline(always)]
-    fn mul(self, b: Self) -> Self {
-        Lanes { simd: self.simd, v: self.simd.mul_f64s(self.v, b.v) }
     }
 }
 

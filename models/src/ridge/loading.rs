@@ -8,8 +8,8 @@
 
 use super::cycle::{self, BINS, Cycle, Steady, mean};
 use super::{Body, ContactForce, Plate, RidgeCase, RidgeError, stability};
-use crate::prediction::Regime;
 use crate::psi::PsiEq17;
+use crate::regime::Regime;
 use serde::Serialize;
 
 /// Width about the tip over which the skin's motion is averaged, m: that of the contact. (The tip node alone
@@ -301,8 +301,7 @@ pub fn run_watched(
     let amplitude = case.amplitude.sine_amplitude_m();
     let mut history = Vec::new();
     if !(1.0..=10.0).contains(&settings.overshoot) {
-        let range = "1 to 10".into();
-        return Err(RidgeError::Input { what: "overshoot".into(), value: settings.overshoot, range });
+        return Err(RidgeError::input("overshoot", settings.overshoot, "1 to 10"));
     }
     let first = amplitude * settings.overshoot;
     for ramp in 0..RAMP_CYCLES {

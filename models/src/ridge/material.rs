@@ -39,7 +39,7 @@ impl Material {
     /// Refuses what no material can be, naming the value.
     pub fn check(&self, what: &str) -> Result<(), RidgeError> {
         let refuse = |name: &str, value: f64, range: &str| {
-            Err(RidgeError::Input { what: format!("{name} of the {what}"), value, range: range.into() })
+            Err(RidgeError::input(format!("{name} of the {what}"), value, range))
         };
         if !(self.young_modulus_pa > 0.0 && self.young_modulus_pa < 1e12) {
             return refuse("Young's modulus in Pa", self.young_modulus_pa, "above 0 and below 1e12");

@@ -61,18 +61,10 @@ impl Mesh {
     ) -> Result<Mesh, RidgeError> {
         let ny = row_material.len();
         if nx == 0 || !nx.is_multiple_of(8) {
-            return Err(RidgeError::Input {
-                what: "number of columns".into(),
-                value: nx as f64,
-                range: "a multiple of 8, above 0".into(),
-            });
+            return Err(RidgeError::input("number of columns", nx as f64, "a multiple of 8, above 0"));
         }
         if ny == 0 {
-            return Err(RidgeError::Input {
-                what: "number of rows".into(),
-                value: 0.0,
-                range: "above 0".into(),
-            });
+            return Err(RidgeError::input("number of rows", 0.0, "above 0"));
         }
         for material in &row_material {
             material.check("layer")?;
@@ -160,11 +152,11 @@ impl Mesh {
             for i in 0..self.nx {
                 let area = self.area_m2(i, j);
                 if !(area > 0.0 && area.is_finite()) {
-                    return Err(RidgeError::Input {
-                        what: format!("area in m2 of the element in column {i}, row {j}"),
-                        value: area,
-                        range: "above 0: the mesh is folded".into(),
-                    });
+                    return Err(RidgeError::input(
+                        format!("area in m2 of the element in column {i}, row {j}"),
+                        area,
+                        "above 0: the mesh is folded",
+                    ));
                 }
             }
         }
@@ -223,17 +215,6 @@ impl RidgeGeometry {
         }
     }
 
-    /// Radius of curvature of the tip in m, infinite for a flat slab.
-    pub fn tip_radius_m(&self) -> f64 {
-        let half = 0.5 * self.ridge_width_m;
-        let parabola = half * half / (2.0 * self.ridge_height_m);
-        match self.profile {
-            RidgeProfile::Parabola => parabola,
-            RidgeProfile::Ellipse => parabola / 0.75,
-            RidgeProfile::Flat => f64::INFINITY,
-        }
-    }
-
     /// A graded periodic mesh of about `elements` quads; fine at the tip, where contact is decided.
     /// Returns the mesh and the row at which the dermis begins.
     pub fn mesh(
@@ -253,11 +234,7 @@ impl RidgeGeometry {
             positive(what, value)?;
         }
         if !(128..=200_000).contains(&elements) {
-            return Err(RidgeError::Input {
-                what: "number of elements".into(),
-                value: elements as f64,
-                range: "128 to 200000".into(),
-            });
+            return Err(RidgeError::input("number of elements", elements as f64, "128 to 200000"));
         }
         // Half the rows in the stratum corneum, a quarter in each softer layer.
         let nx = (((elements as f64).sqrt() / 8.0).round() as usize).max(1) * 8;
@@ -319,15 +296,11 @@ fn graded(length: f64, first: f64, n: usize) -> Vec<f64> {
     let sum = |r: f64| if (r - 1.0).abs() < 1e-12 { n as f64 } else { (r.powi(n as i32) - 1.0) / (r - 1.0) };
     let mut ratio = 1.0;
     if first * (n as f64) < length {
-        let (mut low, mut high) = (1.0, 2.0);
+        let mut high = 2.0;
         while first * sum(high) < length {
             high *= 2.0;
         }
-        for _ in 0..200 {
-            let mid = 0.5 * (low + high);
-            if first * sum(mid) < length { low = mid } else { high = mid }
-        }
-        ratio = 0.5 * (low + high);
+        ratio = crate::root::bisection([1.0, high], 200, |ratio| first * sum(ratio) < length);
     }
     let mut levels = vec![0.0];
     let mut step = 1.0;
@@ -343,5 +316,5 @@ fn positive(what: &str, value: f64) -> Result<(), RidgeError> {
     if value > 0.0 && value.is_finite() {
         return Ok(());
     }
-    Err(RidgeError::Input { what: what.into(), value, range: "above 0 and finite".into() })
+    Err(RidgeError::input(what, value, "above 0 and finite"))
 }

@@ -86,11 +86,7 @@ impl SkinGrid {
             let rising = axis.windows(2).all(|v| v[0] < v[1]) && axis.iter().all(|v| v.is_finite());
             if axis.is_empty() || !rising {
                 let value = axis.last().copied().unwrap_or(f64::NAN);
-                return Err(RidgeError::Input {
-                    what: format!("the grid's {what}"),
-                    value,
-                    range: "a rising list".into(),
-                });
+                return Err(RidgeError::input(format!("the grid's {what}"), value, "a rising list"));
             }
         }
         Ok(())

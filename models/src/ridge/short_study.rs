@@ -35,7 +35,7 @@ pub fn points(base: RidgeCase, reading: Reading) -> Vec<ShortPoint> {
         .filter(|p| p.panel == Panel::Frequency || p.panel.set(base, p.value) != base)
         .map(|p| {
             let w_m = p.case.amplitude.metres();
-            let case = reading.at(p.case, w_m);
+            let case = p.case.at_w(reading, w_m);
             let panel = Panel::ALL.iter().position(|panel| *panel == p.panel).unwrap_or(0);
             let curve = 4 * panel + p.panel.values().iter().position(|v| *v == p.value).unwrap_or(0);
             let psi = case.speed_m_s / (w_m * case.frequency_hz * case.mu0 * (1.0 + case.poisson_ratio));
@@ -95,11 +95,8 @@ pub fn springs(case: &RidgeCase) -> Result<Finger, RidgeError> {
 pub fn slider_psi_star(base: RidgeCase, reading: Reading) -> Result<Option<PsiFit>, RidgeError> {
     let finger = springs(&base)?;
     psi_star_with(base, reading, |case| {
-        let outside = |_| RidgeError::Input {
-            what: "condition of the slider".into(),
-            value: case.amplitude.metres(),
-            range: "within its domain".into(),
-        };
+        let outside =
+            |_| RidgeError::input("condition of the slider", case.amplitude.metres(), "within its domain");
         spring_slider::solve(&case.condition(), &finger).map(|cycle| cycle.mu_relative).map_err(outside)
     })
 }

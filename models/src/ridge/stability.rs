@@ -150,11 +150,7 @@ pub fn add_mass(body: &mut Body, penalty: &[f64], share: f64) -> f64 {
         let nodes = (0..stiffness.len()).filter(|n| free(body, *n));
         nodes.map(|n| (quarter_dt2 * stiffness[n] - body.mass[n]).max(0.0)).sum()
     };
-    let (mut low, mut high) = (0.0, 1.0);
-    for _ in 0..200 {
-        let middle = 0.5 * (low + high);
-        if missing(body, middle) <= share * mass { low = middle } else { high = middle }
-    }
+    let [low, _] = crate::root::halved([0.0, 1.0], 200, |middle| missing(body, middle) <= share * mass);
     let added = missing(body, low);
     for n in (0..stiffness.len()).filter(|n| free(body, *n)).collect::<Vec<_>>() {
         body.mass[n] = body.mass[n].max(low * stiffness[n]);

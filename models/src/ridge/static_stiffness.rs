@@ -95,11 +95,11 @@ pub fn of_mesh(
     line_load_n_m: f64,
 ) -> Result<StaticStiffness, RidgeError> {
     if !(line_load_n_m > 0.0 && line_load_n_m.is_finite()) || held == 0 || held > mesh.ny {
-        return Err(RidgeError::Input {
-            what: "line load in N/m".into(),
-            value: line_load_n_m,
-            range: "above 0, with a held row above the surface".into(),
-        });
+        return Err(RidgeError::input(
+            "line load in N/m",
+            line_load_n_m,
+            "above 0, with a held row above the surface",
+        ));
     }
     let compliance = surface_compliance(mesh, held)?;
     let columns = compliance.len() / 2;
@@ -199,9 +199,9 @@ fn press(
         touching.extend(more);
         touching.sort_unstable();
     }
-    Err(RidgeError::Input {
-        what: "rounds of the contact search".into(),
-        value: 10.0 * gap.len() as f64,
-        range: "fewer: the contact does not settle".into(),
-    })
+    Err(RidgeError::input(
+        "rounds of the contact search",
+        10.0 * gap.len() as f64,
+        "fewer: the contact does not settle",
+    ))
 }

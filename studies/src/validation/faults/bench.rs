@@ -5,11 +5,12 @@ use super::tamper::{Tamper, Tampered};
 use calibration::certificate::sha256_hex;
 use models::condition::{Condition, OutOfDomain};
 use models::finger::Finger;
+use models::law::Rendering;
 use runs::supervisor::{Loop, VirtualLoop};
 
 use models::prediction::{FrictionModel, Prediction, SpringSlider};
 use models::quantity::PeakToPeak;
-use models::target::{Rendering, Target};
+use models::target::Target;
 use realtime::cycle::{Command, Config, Marker, Phase};
 use realtime::estimate::{EstimateConfig, Mu0};
 use realtime::ports::Nanos;

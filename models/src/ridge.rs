@@ -65,3 +65,9 @@ pub enum RidgeError {
     #[error("the run diverged: velocities beyond 1e6 m/s or not numbers; use a smaller time step")]
     Diverged,
 }
+
+impl RidgeError {
+    fn input(what: impl Into<String>, value: f64, range: impl Into<String>) -> Self {
+        Self::Input { what: what.into(), value, range: range.into() }
+    }
+}
