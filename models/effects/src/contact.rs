@@ -13,6 +13,7 @@ mod retarded;
 mod stick;
 pub mod sweep;
 
+use models::root::{bisection, newton_or_half};
 use std::f64::consts::PI;
 
 /// What one pass presents to the contact after every effect has had its say. SI units.
@@ -212,24 +213,13 @@ pub fn half_contact_angle(load: f64, pull: f64) -> f64 {
     if balance(PI).0 <= 0.0 {
         return PI;
     }
-    let (mut low, mut high) = (half_contact_angle(load, 0.0), PI);
-    let mut phi = low;
-    for _ in 0..60 {
+    let look = |phi: f64| {
         let (value, slope) = balance(phi);
-        if value > 0.0 {
-            high = phi;
-        } else {
-            low = phi;
-        }
-        let newton = phi - value / slope;
-        let next = if slope > 0.0 && newton > low && newton < high { newton } else { 0.5 * (low + high) };
-        // Newton squares the error: what is left is below 1e-12.
-        if (next - phi).abs() < 1e-7 * phi {
-            return next;
-        }
-        phi = next;
-    }
-    phi
+        (value > 0.0, if slope > 0.0 { phi - value / slope } else { f64::NAN })
+    };
+    let low = half_contact_angle(load, 0.0);
+    // Newton squares the error: what is left is below 1e-12.
+    newton_or_half([low, PI], low, |phi| 1e-7 * phi, look)
 }
 
 /// Makes the tables that any contact asks for, so that none is made inside a control loop.
@@ -302,12 +292,7 @@ fn hermite(nodes: &[(f64, f64)], place: f64, range: f64) -> f64 {
 }
 
 fn angle_by_bisection(load: f64) -> f64 {
-    let (mut low, mut high) = (0.0, PI);
-    for _ in 0..60 {
-        let middle = 0.5 * (low + high);
-        if arc_load(middle) > load { high = middle } else { low = middle }
-    }
-    0.5 * (low + high)
+    bisection([0.0, PI], 60, |phi| arc_load(phi) <= load)
 }
 
 /// Integral over the cycle of friction limit minus lateral force, in units of `mu0 k_n w/2` radian.

@@ -20,8 +20,8 @@ mod prelude {
 /// Declares the files of this folder and lists their causes.
 macro_rules! causes {
     (library { $($file:ident)* } open_set { $($other:ident)* }) => {
-        $(pub mod $file;)*
-        $(pub mod $other;)*
+        $(mod $file;)*
+        $(mod $other;)*
         static LIBRARY: &[&Effect] = &[$(&$file::EFFECT),*];
         pub(crate) static KNOWN: &[&Effect] = &[$(&$file::EFFECT,)* $(&$other::EFFECT),*];
     };

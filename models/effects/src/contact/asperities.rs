@@ -59,24 +59,14 @@ pub fn mean_friction(c: &Contact) -> f64 {
             (sum + weight * value, slope + weight * rate)
         })
     };
-    let (mut low, mut high) = (-1.0 - 12.0 * spread, load + 1.0 + 12.0 * spread);
-    let mut depth = if load >= 1.0 { load } else { -crate::contact::half_contact_angle(load, 0.0).cos() };
-    for _ in 0..60 {
+    let ends = [-1.0 - 12.0 * spread, load + 1.0 + 12.0 * spread];
+    let start = if load >= 1.0 { load } else { -crate::contact::half_contact_angle(load, 0.0).cos() };
+    // Newton squares the error: what is left is below 1e-12.
+    let close = |depth: f64| 1e-7 * (1.0 + depth.abs());
+    let depth = models::root::newton_or_half(ends, start, close, |depth| {
         let (value, slope) = carried(depth);
-        if value > load {
-            high = depth;
-        } else {
-            low = depth;
-        }
-        let newton = depth - (value - load) / slope.max(1e-12);
-        let next = if newton > low && newton < high { newton } else { 0.5 * (low + high) };
-        // Newton squares the error: what is left is below 1e-12.
-        if (next - depth).abs() < 1e-7 * (1.0 + depth.abs()) {
-            depth = next;
-            break;
-        }
-        depth = next;
-    }
+        (value > load, depth - (value - load) / slope.max(1e-12))
+    });
     // Each asperity is a contact of its own under its own load; what belongs to the whole finger it has in its share.
     let plain = !c.beyond_closed_form();
     let unit = c.normal_stiffness * half;

@@ -68,12 +68,7 @@ impl Began {
     /// The root by bisection, from right of the maximum of the gap.
     fn root(&self) -> f64 {
         let gap = |x: f64| x.cos() - self.cos - self.drag * (x - self.start);
-        let (mut low, mut high) = (-self.drag.min(1.0).asin(), -self.start);
-        for _ in 0..50 {
-            let middle = 0.5 * (low + high);
-            if gap(middle) > 0.0 { low = middle } else { high = middle }
-        }
-        0.5 * (low + high)
+        models::root::bisection([-self.drag.min(1.0).asin(), -self.start], 50, |x| gap(x) > 0.0)
     }
 }
 

@@ -5,8 +5,7 @@ use super::prelude::*;
 /// What sees it without friction.
 const CHECK: &str = "Measure the plate with a vibrometer while the finger is pressed on it.";
 
-/// See the module.
-pub static EFFECT: Effect = Effect {
+pub(super) static EFFECT: Effect = Effect {
     name: "amplitude_droop",
     place: Place::Plate,
     summary: "An amplifier without amplitude control lets w fall as the finger's impedance is pressed on the plate.",

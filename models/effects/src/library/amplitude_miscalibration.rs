@@ -5,8 +5,7 @@ use super::prelude::*;
 /// What sees it without friction.
 const CHECK: &str = "Measure the plate with a vibrometer at three drives.";
 
-/// See the module.
-pub static EFFECT: Effect = Effect {
+pub(super) static EFFECT: Effect = Effect {
     name: "amplitude_miscalibration",
     place: Place::Plate,
     summary: "True amplitude is a constant factor (or a dead zone) away from the commanded one.",

@@ -5,8 +5,7 @@ use super::prelude::*;
 /// What sees it without friction.
 const CHECK: &str = "Measure the plate with a vibrometer at the largest drives.";
 
-/// See the module.
-pub static EFFECT: Effect = Effect {
+pub(super) static EFFECT: Effect = Effect {
     name: "amplitude_saturation",
     place: Place::Plate,
     summary: "Above some command the amplitude no longer follows.",
@@ -32,24 +31,13 @@ pub static EFFECT: Effect = Effect {
     change: |law, theta, _, design, c| {
         let x = theta[0] * c.amplitude_pp;
         c.amplitude_pp *= match law {
-            0 => {
-                if x > 1.0 {
-                    1.0 / x
-                } else {
-                    1.0
-                }
-            }
+            0 => 1.0 / x.max(1.0),
             1 => {
                 let x = x * (c.frequency / design.reference_frequency_hz).powf(theta[2]);
                 (1.0 + x.powf(theta[1])).powf(-1.0 / theta[1])
             }
-            _ => {
-                if x > 1e-6 {
-                    x.tanh() / x
-                } else {
-                    1.0
-                }
-            }
+            _ if x > 1e-6 => x.tanh() / x,
+            _ => 1.0,
         };
     },
     ..Effect::NONE

@@ -2,8 +2,7 @@
 
 use super::prelude::*;
 
-/// See the module.
-pub static EFFECT: Effect = Effect {
+pub(super) static EFFECT: Effect = Effect {
     name: "contact_ageing",
     place: Place::Contact,
     summary: "Short contacts have not yet formed all their bonds, so the limit is lower than mu0 F.",

@@ -6,8 +6,7 @@ use super::prelude::*;
 const CHECK: &str =
     "Press on the sensor with a dead weight and no motion, plate levelled; read the lateral axis.";
 
-/// See the module.
-pub static EFFECT: Effect = Effect {
+pub(super) static EFFECT: Effect = Effect {
     name: "force_crosstalk",
     place: Place::Instrument,
     summary: "A share of the normal force is read as lateral force, the same in both directions (or the reverse).",

@@ -4,8 +4,7 @@
 use super::prelude::*;
 use crate::contact::sweep::root;
 
-/// See the module.
-pub static EFFECT: Effect = Effect {
+pub(super) static EFFECT: Effect = Effect {
     name: "frictional_heating",
     place: Place::Contact,
     summary: "Friction falls with the power that rubbing dissipates.",

@@ -2,8 +2,7 @@
 
 use super::prelude::*;
 
-/// See the module.
-pub static EFFECT: Effect = Effect {
+pub(super) static EFFECT: Effect = Effect {
     name: "lateral_gain",
     place: Place::Instrument,
     summary: "Lateral force read by a constant factor: an exact alias of mu0 and lateral stiffness together.",

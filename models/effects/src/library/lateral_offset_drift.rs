@@ -5,18 +5,17 @@ use super::prelude::*;
 /// What sees it without friction.
 const CHECK: &str = "Lift the finger every few passes and read the lateral force.";
 
-/// See the module.
-pub static EFFECT: Effect = Effect {
+const OFFSET: Parameter = Parameter::signed("offset", "N", 0.01, -0.3, 0.3);
+const DRIFT: Parameter = Parameter::signed("drift_over_table", "N", 0.015, -0.4, 0.4);
+
+pub(super) static EFFECT: Effect = Effect {
     name: "lateral_offset_drift",
     place: Place::Instrument,
     summary: "An offset of the lateral force, constant or drifting, whatever the load and the direction.",
     source: "thermal drift of 1 to 80 mN per stroke of strain-gauge and piezo cells",
     laws: &[
-        Law::new("constant", &[Parameter::signed("offset", "N", 0.01, -0.3, 0.3)])
-            .certified_by(CertifiedKey::LateralOffset)
-            .seen_by(CHECK, 0.0005),
-        Law::new("linear drift", &[Parameter::signed("drift_over_table", "N", 0.015, -0.4, 0.4)])
-            .seen_by(CHECK, 0.0005),
+        Law::new("constant", &[OFFSET]).certified_by(CertifiedKey::LateralOffset).seen_by(CHECK, 0.0005),
+        Law::new("linear drift", &[DRIFT]).seen_by(CHECK, 0.0005),
         Law::new(
             "settling",
             &[
@@ -27,19 +26,12 @@ pub static EFFECT: Effect = Effect {
         .seen_by(CHECK, 0.0005),
         Law::new(
             "offset with curved drift",
-            &[
-                Parameter::signed("offset", "N", 0.01, -0.3, 0.3),
-                Parameter::signed("drift_over_table", "N", 0.015, -0.4, 0.4),
-                Parameter::signed("curvature_over_table", "N", 0.015, -0.4, 0.4),
-            ],
+            &[OFFSET, DRIFT, Parameter::signed("curvature_over_table", "N", 0.015, -0.4, 0.4)],
         )
         .seen_by(CHECK, 0.0005),
         Law::new(
             "offset with temperature",
-            &[
-                Parameter::signed("offset", "N", 0.01, -0.3, 0.3),
-                Parameter::signed("per_kelvin", "N/K", 0.003, -0.1, 0.1),
-            ],
+            &[OFFSET, Parameter::signed("per_kelvin", "N/K", 0.003, -0.1, 0.1)],
         )
         .needs(&[Need::Temperatures])
         .seen_by(CHECK, 0.0005),

@@ -8,8 +8,7 @@ const LIMITS: [Parameter; 2] = [
     Parameter::shape("stretch_of_half_speed", "m", 1e-7, 1.3).bending(),
 ];
 
-/// See the module.
-pub static EFFECT: Effect = Effect {
+pub(super) static EFFECT: Effect = Effect {
     name: "lateral_recovery",
     place: Place::Contact,
     summary: "Stretch left from the last contact lets the friction force start higher in the next.",

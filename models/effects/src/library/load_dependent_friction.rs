@@ -2,8 +2,7 @@
 
 use super::prelude::*;
 
-/// See the module.
-pub static EFFECT: Effect = Effect {
+pub(super) static EFFECT: Effect = Effect {
     name: "load_dependent_friction",
     place: Place::Contact,
     summary: "The friction coefficient depends on the load, as area-controlled (non-Coulombic) friction has it.",

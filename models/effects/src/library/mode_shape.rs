@@ -9,8 +9,7 @@ const CHECK: &str = "Scan the plate with a vibrometer along the stroke.";
 /// Least square of the amplitude at a node over that at an antinode: a finger is wider than a node.
 const LEAST_SQUARE: f64 = 4e-4;
 
-/// See the module.
-pub static EFFECT: Effect = Effect {
+pub(super) static EFFECT: Effect = Effect {
     name: "mode_shape",
     place: Place::Plate,
     summary: "Nodes and antinodes: the amplitude depends on where on the plate the finger is.",

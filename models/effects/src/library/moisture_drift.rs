@@ -2,26 +2,21 @@
 
 use super::prelude::*;
 
-/// See the module.
-pub static EFFECT: Effect = Effect {
+/// The characteristic time of an approach.
+const TIME: Parameter = Parameter::shape("time_constant", "s", 60.0, 1.4);
+/// The parameters of an exponential approach.
+const APPROACH: &[Parameter] = &[Parameter::signed("relative_change", "1", 0.4, -0.8, 9.0), TIME];
+
+pub(super) static EFFECT: Effect = Effect {
     name: "moisture_drift",
     place: Place::Contact,
     summary: "Friction drifts as the skin under the finger takes up water, with the plate still as well as vibrating.",
     source: "occlusion with a characteristic time of 20 s, up to tenfold (Dzidek 2014); 5 to 2000 s allowed",
     laws: &[
-        Law::new(
-            "exponential approach",
-            &[
-                Parameter::signed("relative_change", "1", 0.4, -0.8, 9.0),
-                Parameter::shape("time_constant", "s", 60.0, 1.4),
-            ],
-        ),
+        Law::new("exponential approach", APPROACH),
         Law::new(
             "approach with softening",
-            &[
-                Parameter::signed("relative_change", "1", 0.4, -0.6, 5.0),
-                Parameter::shape("time_constant", "s", 60.0, 1.4),
-            ],
+            &[Parameter::signed("relative_change", "1", 0.4, -0.6, 5.0), TIME],
         ),
         Law::new(
             "logarithm of time",
@@ -30,14 +25,7 @@ pub static EFFECT: Effect = Effect {
                 Parameter::shape("onset_time", "s", 20.0, 1.2),
             ],
         ),
-        Law::new(
-            "exponential approach in each run",
-            &[
-                Parameter::signed("relative_change", "1", 0.4, -0.8, 9.0),
-                Parameter::shape("time_constant", "s", 60.0, 1.4),
-            ],
-        )
-        .needs(&[Need::Runs]),
+        Law::new("exponential approach in each run", APPROACH).needs(&[Need::Runs]),
     ],
     acts: Some(Acts { on: Input::Friction, over: &[&covariate::TIME] }),
     needs: &[Need::Time],

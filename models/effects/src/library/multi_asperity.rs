@@ -3,8 +3,7 @@
 use super::prelude::*;
 use crate::contact::asperities::Heights;
 
-/// See the module.
-pub static EFFECT: Effect = Effect {
+pub(super) static EFFECT: Effect = Effect {
     name: "multi_asperity",
     place: Place::Contact,
     summary: "Asperities of unequal height touch for unequal times: no kink at the onset, a tail at large amplitude.",

@@ -2,8 +2,7 @@
 
 use super::prelude::*;
 
-/// See the module.
-pub static EFFECT: Effect = Effect {
+pub(super) static EFFECT: Effect = Effect {
     name: "normal_damping",
     place: Place::Contact,
     summary: "A dashpot beside the normal spring changes how long, and how hard, ridge and plate touch.",

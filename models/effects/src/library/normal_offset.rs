@@ -5,8 +5,7 @@ use super::prelude::*;
 /// What sees it without friction.
 const CHECK: &str = "Lift the finger and read the normal force; put a dead weight on it.";
 
-/// See the module.
-pub static EFFECT: Effect = Effect {
+pub(super) static EFFECT: Effect = Effect {
     name: "normal_offset",
     place: Place::Instrument,
     summary: "Measured normal force = true force + offset; the contact is loaded by the true one.",

@@ -2,8 +2,7 @@
 
 use super::prelude::*;
 
-/// See the module.
-pub static EFFECT: Effect = Effect {
+pub(super) static EFFECT: Effect = Effect {
     name: "plate_tilt",
     place: Place::Instrument,
     summary: "A component of the load is read as lateral force, and one of the friction as normal force.",

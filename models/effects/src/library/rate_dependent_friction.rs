@@ -5,8 +5,7 @@ use super::prelude::*;
 /// Most by which a curve changes mu0, in e-folds: beyond the speeds of a table a polynomial runs away.
 const MOST_E_FOLDS: f64 = 2.0;
 
-/// See the module.
-pub static EFFECT: Effect = Effect {
+pub(super) static EFFECT: Effect = Effect {
     name: "rate_dependent_friction",
     place: Place::Contact,
     summary: "Faster or slower sliding changes mu0 itself; seen with the plate still.",

@@ -7,24 +7,18 @@ use super::prelude::*;
 /// What sees it without friction.
 const CHECK: &str = "Retune the drive (sweep its frequency) at the start and the end of a run.";
 
-/// See the module.
-pub static EFFECT: Effect = Effect {
+const PER_KELVIN: Parameter = Parameter::positive("detuning_per_kelvin", "1/K", 0.15, 5.0);
+const DETUNING: Parameter = Parameter::positive("detuning", "1", 1.0, 12.0);
+const TIME: Parameter = Parameter::shape("time_constant_over_duration", "1", 0.7, 1.0);
+
+pub(super) static EFFECT: Effect = Effect {
     name: "resonance_detuning",
     place: Place::Plate,
     summary: "Off resonance the plate moves less than commanded, by the Lorentzian of its quality factor.",
     source: "Q 100 at 27.5 kHz: 138 Hz halve the power; temperature coefficient of the plate's modulus",
     laws: &[
-        Law::new("warming (temperature)", &[Parameter::positive("detuning_per_kelvin", "1/K", 0.15, 5.0)])
-            .needs(&[Need::Temperatures])
-            .seen_by(CHECK, 0.05),
-        Law::new(
-            "drift with time",
-            &[
-                Parameter::positive("detuning", "1", 1.0, 12.0),
-                Parameter::shape("time_constant_over_duration", "1", 0.7, 1.0),
-            ],
-        )
-        .seen_by(CHECK, 0.05),
+        Law::new("warming (temperature)", &[PER_KELVIN]).needs(&[Need::Temperatures]).seen_by(CHECK, 0.05),
+        Law::new("drift with time", &[DETUNING, TIME]).seen_by(CHECK, 0.05),
         Law::new(
             "fixed resonance",
             &[
@@ -34,19 +28,12 @@ pub static EFFECT: Effect = Effect {
         )
         .needs(&[Need::Frequencies])
         .seen_by(CHECK, 3.0),
-        Law::new(
-            "loss with time",
-            &[
-                Parameter::positive("loss", "1", 0.5, 8.0),
-                Parameter::shape("time_constant_over_duration", "1", 0.7, 1.0),
-            ],
-        )
-        .seen_by(CHECK, 0.05),
+        Law::new("loss with time", &[Parameter::positive("loss", "1", 0.5, 8.0), TIME]).seen_by(CHECK, 0.05),
         // The point of tuning need not be the first pass, and a softening resonator falls with its own swing.
         Law::new(
             "warming about a tuning point",
             &[
-                Parameter::positive("detuning_per_kelvin", "1/K", 0.15, 5.0),
+                PER_KELVIN,
                 Parameter::signed("tuning_point_above_first", "K", 3.0, -20.0, 20.0),
                 Parameter::signed("softening_at_largest_amplitude", "K", 2.0, -20.0, 20.0),
             ],
@@ -56,8 +43,8 @@ pub static EFFECT: Effect = Effect {
         Law::new(
             "drift about a tuning point",
             &[
-                Parameter::positive("detuning", "1", 1.0, 12.0),
-                Parameter::shape("time_constant_over_duration", "1", 0.7, 1.0),
+                DETUNING,
+                TIME,
                 Parameter::signed("tuning_point", "1", 0.3, -2.0, 2.0),
                 Parameter::signed("softening_at_largest_amplitude", "1", 0.3, -3.0, 3.0),
             ],
@@ -67,30 +54,22 @@ pub static EFFECT: Effect = Effect {
     acts: Some(Acts { on: Input::Amplitude, over: &[&covariate::TIME] }),
     needs: &[Need::Vibration],
     change: |law, theta, pass, design, c| {
+        let faded = || (-pass.time_s / (theta[1] * design.duration_s.max(1e-9))).exp_m1();
         if law == 3 {
-            let tau = theta[1] * design.duration_s.max(1e-9);
-            c.amplitude_pp /= 1.0 - theta[0] * (-pass.time_s / tau).exp_m1();
+            c.amplitude_pp /= 1.0 - theta[0] * faded();
             return;
         }
+        let warmer = || pass.temperature_c.map_or(0.0, |t| t - design.reference_temperature_c);
         let swing = (c.amplitude_pp / design.largest_amplitude_m.max(1e-12)).powi(2);
         let off = match law {
-            0 => theta[0] * pass.temperature_c.map_or(0.0, |t| t - design.reference_temperature_c),
-            1 => {
-                let tau = theta[1] * design.duration_s.max(1e-9);
-                -theta[0] * (-pass.time_s / tau).exp_m1()
-            }
+            0 => theta[0] * warmer(),
+            1 => -theta[0] * faded(),
             2 => {
                 let r = pass.frequency_hz / (design.reference_frequency_hz * theta[1]);
                 theta[0] * (r - 1.0 / r)
             }
-            4 => {
-                let warmer = pass.temperature_c.map_or(0.0, |t| t - design.reference_temperature_c);
-                theta[0] * (warmer - theta[1] + theta[2] * swing)
-            }
-            _ => {
-                let tau = theta[1] * design.duration_s.max(1e-9);
-                theta[0] * (-(-pass.time_s / tau).exp_m1() - theta[2] + theta[3] * swing)
-            }
+            4 => theta[0] * (warmer() - theta[1] + theta[2] * swing),
+            _ => theta[0] * (-faded() - theta[2] + theta[3] * swing),
         };
         c.amplitude_pp /= (1.0 + off * off).sqrt();
     },

@@ -2,8 +2,7 @@
 
 use super::prelude::*;
 
-/// See the module.
-pub static EFFECT: Effect = Effect {
+pub(super) static EFFECT: Effect = Effect {
     name: "sensor_lag",
     place: Place::Instrument,
     summary: "A lagging force channel rounds edges and opens loops at reversals, but leaves steady means alone.",

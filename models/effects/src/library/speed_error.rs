@@ -5,8 +5,7 @@ use super::prelude::*;
 /// What sees it without friction.
 const CHECK: &str = "Time the stage over its stroke, or read its encoder.";
 
-/// See the module.
-pub static EFFECT: Effect = Effect {
+pub(super) static EFFECT: Effect = Effect {
     name: "speed_error",
     place: Place::Instrument,
     summary: "True speed is a factor (or a constant) away from the commanded one; the factor may change with speed.",

@@ -3,8 +3,7 @@
 use super::prelude::*;
 use std::f64::consts::PI;
 
-/// See the module.
-pub static EFFECT: Effect = Effect {
+pub(super) static EFFECT: Effect = Effect {
     name: "speed_ripple",
     place: Place::Instrument,
     summary: "Speed varies along the stroke with the screw's pitch, and friction follows where it depends on speed.",

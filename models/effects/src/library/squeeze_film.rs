@@ -30,8 +30,7 @@ const POWERS: [Parameter; 6] = [
     Parameter::shape("pressure_exponent", "1", 1.0, 0.2).bending(),
 ];
 
-/// See the module.
-pub static EFFECT: Effect = Effect {
+pub(super) static EFFECT: Effect = Effect {
     name: "squeeze_film",
     place: Place::Contact,
     summary: "Compressed air carries a share of the load that grows with amplitude and ambient pressure.",
@@ -126,24 +125,14 @@ fn film_share(a: f64, air: f64, load: f64) -> f64 {
     let rest = (SOLID_SCALE_N / load).ln().max(0.2);
     let lift = 1.25 * AIR_SCALE_N * air * a * a / load;
     // exp(rest - u) + lift/u^2 = 1, falling in u.
-    let (mut low, mut high) = (rest, rest + 40.0 + 2.0 * lift.sqrt());
-    let mut u = rest + lift.sqrt() * 0.5;
-    for _ in 0..60 {
+    let look = |u: f64| {
         let solid = (rest - u).exp();
         let value = solid + lift / (u * u) - 1.0;
-        if value > 0.0 {
-            low = u
-        } else {
-            high = u
-        }
-        let newton = u + value / (solid + 2.0 * lift / (u * u * u));
-        let next = if newton > low && newton < high { newton } else { 0.5 * (low + high) };
-        if (next - u).abs() < 1e-10 * u {
-            u = next;
-            break;
-        }
-        u = next;
-    }
+        let nearer = value > 0.0;
+        (!nearer, u + value / (solid + 2.0 * lift / (u * u * u)))
+    };
+    let ends = [rest, rest + 40.0 + 2.0 * lift.sqrt()];
+    let u = models::root::newton_or_half(ends, rest + lift.sqrt() * 0.5, |u| 1e-10 * u, look);
     (rest - u).exp().min(1.0)
 }
 

@@ -2,8 +2,7 @@
 
 use super::prelude::*;
 
-/// See the module.
-pub static EFFECT: Effect = Effect {
+pub(super) static EFFECT: Effect = Effect {
     name: "stiffness_error",
     place: Place::Finger,
     summary: "Normal or lateral stiffness lies outside the range that its calibration states.",

@@ -2,51 +2,30 @@
 
 use super::prelude::*;
 
-/// See the module.
-pub static EFFECT: Effect = Effect {
+/// The parameters of a creep with one time constant.
+const ONE_TIME: &[Parameter] = &[
+    Parameter::signed("relative_change", "1", 0.4, -0.8, 4.0),
+    Parameter::shape("time_constant", "s", 30.0, 1.5),
+];
+/// Tissue has no single relaxation time: Kohlrausch's function, the usual one for a broad spectrum of times.
+const BROAD: &[Parameter] = &[ONE_TIME[0], ONE_TIME[1], Parameter::shape("exponent", "1", 0.6, 0.3)];
+/// Those of a logarithmic creep.
+const LOGARITHMIC: &[Parameter] = &[
+    Parameter::signed("relative_change_per_e_fold", "1", 0.12, -0.15, 1.5),
+    Parameter::shape("onset_time", "s", 5.0, 1.2),
+];
+
+pub(super) static EFFECT: Effect = Effect {
     name: "subsurface_relaxation",
     place: Place::Contact,
     summary: "Creep of the soft tissue changes the stiffness of the contact with time, not its friction coefficient.",
     source: "longest relaxation time of a finger pad about 3 s (the paper's introduction); area grows as log t",
     laws: &[
-        Law::new(
-            "exponential creep",
-            &[
-                Parameter::signed("relative_change", "1", 0.4, -0.8, 4.0),
-                Parameter::shape("time_constant", "s", 30.0, 1.5),
-            ],
-        ),
-        Law::new(
-            "logarithmic creep",
-            &[
-                Parameter::signed("relative_change_per_e_fold", "1", 0.12, -0.15, 1.5),
-                Parameter::shape("onset_time", "s", 5.0, 1.2),
-            ],
-        ),
-        Law::new(
-            "normal stiffness alone",
-            &[
-                Parameter::signed("relative_change", "1", 0.4, -0.8, 4.0),
-                Parameter::shape("time_constant", "s", 30.0, 1.5),
-            ],
-        ),
-        Law::new(
-            "normal stiffness alone, logarithmic",
-            &[
-                Parameter::signed("relative_change_per_e_fold", "1", 0.12, -0.15, 1.5),
-                Parameter::shape("onset_time", "s", 5.0, 1.2),
-            ],
-        ),
-        // Tissue has no single relaxation time: Kohlrausch's function, the usual one for a broad spectrum of
-        // times.
-        Law::new(
-            "normal stiffness alone, stretched exponential",
-            &[
-                Parameter::signed("relative_change", "1", 0.4, -0.8, 4.0),
-                Parameter::shape("time_constant", "s", 30.0, 1.5),
-                Parameter::shape("exponent", "1", 0.6, 0.3),
-            ],
-        ),
+        Law::new("exponential creep", ONE_TIME),
+        Law::new("logarithmic creep", LOGARITHMIC),
+        Law::new("normal stiffness alone", ONE_TIME),
+        Law::new("normal stiffness alone, logarithmic", LOGARITHMIC),
+        Law::new("normal stiffness alone, stretched exponential", BROAD),
     ],
     near: &["speed_error", "amplitude_miscalibration", "resonance_detuning"],
     acts: Some(Acts { on: Input::Stiffness, over: &[&covariate::TIME] }),

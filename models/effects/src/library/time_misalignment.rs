@@ -2,8 +2,7 @@
 
 use super::prelude::*;
 
-/// See the module.
-pub static EFFECT: Effect = Effect {
+pub(super) static EFFECT: Effect = Effect {
     name: "time_misalignment",
     place: Place::Instrument,
     summary: "The force is filed under a wrong instant: profiles along the plate shift with the direction.",
