@@ -228,12 +228,8 @@ impl Contact {
             HEIGHTS.iter().map(|h| element::cycle(preload + h * spread, 1.0).normal).sum::<f64>()
                 / (2.0 * PI * count)
         };
-        let (mut low, mut high) = (-1.0 - 1.5 * spread, target + 1.0 + 1.5 * spread);
-        for _ in 0..48 {
-            let middle = 0.5 * (low + high);
-            if normal(middle) < target { low = middle } else { high = middle }
-        }
-        let preload = 0.5 * (low + high);
+        let ends = [-1.0 - 1.5 * spread, target + 1.0 + 1.5 * spread];
+        let preload = models::root::bisection(ends, 48, |preload| normal(preload) < target);
         let (mut carried, mut lateral, mut contact) = (0.0, 0.0, 0.0);
         for height in HEIGHTS {
             let cycle = element::cycle(preload + height * spread, drag);

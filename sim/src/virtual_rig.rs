@@ -187,38 +187,29 @@ impl ForceSensor for SharedRig {
     }
 }
 
-impl Amplifier for SharedRig {
-    fn command(&mut self, command: DriveCommand, now: Nanos) {
-        Amplifier::command(&mut *self.rig(), command, now);
-    }
+/// A port that takes commands and says its state passes both on to the rig.
+macro_rules! commanded {
+    ($($port:ident $command:ident $state:ident;)*) => {
+        $(impl $port for SharedRig {
+            fn command(&mut self, command: $command, now: Nanos) {
+                $port::command(&mut *self.rig(), command, now);
+            }
 
-    fn state(&mut self, now: Nanos) -> Result<AmplifierState, NoData> {
-        Amplifier::state(&mut *self.rig(), now)
-    }
+            fn state(&mut self, now: Nanos) -> Result<$state, NoData> {
+                $port::state(&mut *self.rig(), now)
+            }
+        })*
+    };
 }
 
-impl SupplySwitch for SharedRig {
-    fn command(&mut self, command: SupplyCommand, now: Nanos) {
-        SupplySwitch::command(&mut *self.rig(), command, now);
-    }
-
-    fn state(&mut self, now: Nanos) -> Result<SupplyState, NoData> {
-        SupplySwitch::state(&mut *self.rig(), now)
-    }
+commanded! {
+    Amplifier DriveCommand AmplifierState;
+    SupplySwitch SupplyCommand SupplyState;
+    Stage StageCommand StageState;
 }
 
 impl SafetyInputs for SharedRig {
     fn read(&mut self, now: Nanos) -> Contacts {
         SafetyInputs::read(&mut *self.rig(), now)
-    }
-}
-
-impl Stage for SharedRig {
-    fn command(&mut self, command: StageCommand, now: Nanos) {
-        Stage::command(&mut *self.rig(), command, now);
-    }
-
-    fn state(&mut self, now: Nanos) -> Result<StageState, NoData> {
-        Stage::state(&mut *self.rig(), now)
     }
 }

@@ -8,7 +8,7 @@
 use std::f64::consts::PI;
 
 use super::Contact;
-use super::resolved::{Cycle, LIGHTEST_KG, March, transition};
+use super::resolved::{Cycle, LIGHTEST_KG, March, Sums, transition};
 
 impl March {
     /// One period over a compliant skin, from the plate's top; then the static compression is corrected.
@@ -30,7 +30,7 @@ impl March {
         let rest = -k * self.preload_m / (k + ks);
         let (turn_s, turn_c) = (omega * dt).sin_cos();
         let (mut cos, mut sin) = (1.0_f64, 0.0_f64);
-        let (mut lateral, mut normal, mut touched) = (0.0, 0.0, 0usize);
+        let mut sums = Sums::default();
         for _ in 0..self.steps {
             let forced = |cos: f64, sin: f64| (fr * cos - fi * sin + rest, -omega * (fr * sin + fi * cos));
             if self.touching {
@@ -49,25 +49,9 @@ impl March {
             let (depth, closing) = (a * cos - self.height_m, -a * omega * sin - self.speed_m_s);
             let pressed = ks * depth + cs * closing;
             self.touching = depth > 0.0 && pressed > 0.0;
-            let (force, side) = if self.touching {
-                touched += 1;
-                (pressed, self.spring.touch(contact, pressed, contact.speed_m_s, dt))
-            } else {
-                self.spring.release(contact.recovery, dt);
-                (0.0, 0.0)
-            };
-            normal += 0.5 * (self.last_normal_n + force) * dt;
-            lateral += 0.5 * (self.last_lateral_n + side) * dt;
-            (self.last_normal_n, self.last_lateral_n) = (force, side);
+            self.rub(contact, pressed, dt, &mut sums);
         }
-        let share = touched as f64 / self.steps as f64;
-        let cycle = Cycle {
-            lateral_n: lateral * contact.frequency_hz,
-            normal_n: normal * contact.frequency_hz,
-            contact: share,
-        };
-        self.preload_m += 0.2 * (contact.normal_force_n - cycle.normal_n) / (k * share.max(0.15));
-        cycle
+        self.balanced(contact, &sums, 0.2)
     }
 }
 

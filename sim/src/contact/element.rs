@@ -8,6 +8,7 @@
 //!
 //! Units: normal force in `k_n a`, lateral stretch in `mu k_n a / k_l`. So `drag = k_l U / (mu k_n a omega)`.
 
+use models::root::newton_or_half;
 use std::f64::consts::PI;
 
 /// Integrals of one element over one cycle, in radians times the units of this module.
@@ -62,27 +63,15 @@ pub fn cycle(preload: f64, drag: f64) -> Integrals {
 /// The angle at which a stretch that grows by `drag` from `start` meets the falling excess of the limit.
 fn slip_angle(start: f64, stretch: f64, drag: f64, preload: f64, crest: f64, end: f64) -> f64 {
     let excess = |theta: f64| theta.cos() + preload - stretch - drag * (theta - start);
-    let (mut low, mut high) = (crest, end);
-    if excess(high) >= 0.0 {
-        return high; // Stuck to the end (only by rounding, or without any drag).
+    if excess(end) >= 0.0 {
+        return end; // Stuck to the end (only by rounding, or without any drag).
     }
-    let mut theta = 0.5 * (low + high);
-    for _ in 0..60 {
+    let look = |theta: f64| {
         let value = excess(theta);
-        if value > 0.0 {
-            low = theta
-        } else {
-            high = theta
-        }
-        let newton = theta + value / (theta.sin() + drag);
-        let next = if newton > low && newton < high { newton } else { 0.5 * (low + high) };
-        let moved = (next - theta).abs();
-        theta = next;
-        if moved < 1e-13 {
-            break;
-        }
-    }
-    theta
+        let sticks = value > 0.0;
+        (!sticks, theta + value / (theta.sin() + drag))
+    };
+    newton_or_half([crest, end], 0.5 * (crest + end), |_| 1e-13, look)
 }
 
 /// The preload at which the mean normal force is `mean` (in `k_n a`): root of the cycle's force balance.
@@ -95,24 +84,13 @@ pub fn preload_for(mean: f64) -> f64 {
     }
     // sin(alpha) - alpha cos(alpha) = pi * mean, by Newton from the small-angle solution, in a bracket.
     let target = PI * mean;
-    let (mut low, mut high) = (0.0_f64, PI);
-    let mut alpha = (3.0 * target).cbrt().min(0.98 * PI);
-    for _ in 0..60 {
+    let look = |alpha: f64| {
         let (sin, cos) = alpha.sin_cos();
         let value = sin - alpha * cos - target;
-        if value < 0.0 {
-            low = alpha
-        } else {
-            high = alpha
-        }
-        let newton = alpha - value / (alpha * sin);
-        let next = if newton > low && newton < high { newton } else { 0.5 * (low + high) };
-        let moved = (next - alpha).abs();
-        alpha = next;
-        if moved < 1e-14 {
-            break;
-        }
-    }
+        let light = value < 0.0;
+        (!light, alpha - value / (alpha * sin))
+    };
+    let alpha = newton_or_half([0.0, PI], (3.0 * target).cbrt().min(0.98 * PI), |_| 1e-14, look);
     -alpha.cos()
 }
 

@@ -97,6 +97,14 @@ pub struct Cycle {
     pub contact: f64,
 }
 
+/// Integrals of the forces over a cycle so far, N s, and the steps in contact.
+#[derive(Default)]
+pub(super) struct Sums {
+    lateral: f64,
+    normal: f64,
+    touched: usize,
+}
+
 /// The moving ridge.
 #[derive(Clone, Copy, Debug)]
 pub struct March {
@@ -143,7 +151,7 @@ impl March {
         let a = contact.sine_amplitude_m;
         let (turn_s, turn_c) = (omega * dt).sin_cos();
         let (mut cos, mut sin) = (1.0_f64, 0.0_f64);
-        let (mut lateral, mut normal, mut touched) = (0.0, 0.0, 0usize);
+        let mut sums = Sums::default();
         for _ in 0..self.steps {
             let (z0, zd0) = (a * cos, -a * omega * sin);
             (cos, sin) = (cos * turn_c - sin * turn_s, sin * turn_c + cos * turn_s);
@@ -167,30 +175,40 @@ impl March {
                 self.height_m = map[0] * q + map[1] * v - self.preload_m;
                 self.speed_m_s = map[2] * q + map[3] * v;
                 if self.height_m <= z {
-                    normal += m * (zd - self.speed_m_s).max(0.0); // the landing's impulse
+                    sums.normal += m * (zd - self.speed_m_s).max(0.0); // the landing's impulse
                     self.touching = true;
                 }
             }
-            let (force, side) = if self.touching {
-                touched += 1;
-                let force = pressed.max(0.0);
-                (force, self.spring.touch(contact, force, contact.speed_m_s, dt))
-            } else {
-                self.spring.release(contact.recovery, dt);
-                (0.0, 0.0)
-            };
-            normal += 0.5 * (self.last_normal_n + force) * dt;
-            lateral += 0.5 * (self.last_lateral_n + side) * dt;
-            (self.last_normal_n, self.last_lateral_n) = (force, side);
+            self.rub(contact, pressed, dt, &mut sums);
         }
-        let out = Cycle {
-            lateral_n: lateral * contact.frequency_hz,
-            normal_n: normal * contact.frequency_hz,
-            contact: touched as f64 / self.steps as f64,
+        self.balanced(contact, &sums, 0.3)
+    }
+
+    /// Takes what presses at the end of a step, and what it drags along, into the sums of the cycle.
+    pub(super) fn rub(&mut self, contact: &Contact, pressed: f64, dt: f64, sums: &mut Sums) {
+        let (force, side) = if self.touching {
+            sums.touched += 1;
+            let force = pressed.max(0.0);
+            (force, self.spring.touch(contact, force, contact.speed_m_s, dt))
+        } else {
+            self.spring.release(contact.recovery, dt);
+            (0.0, 0.0)
         };
-        let slope = k * out.contact.max(0.15);
-        self.preload_m += 0.3 * (contact.normal_force_n - out.normal_n) / slope;
-        out
+        sums.normal += 0.5 * (self.last_normal_n + force) * dt;
+        sums.lateral += 0.5 * (self.last_lateral_n + side) * dt;
+        (self.last_normal_n, self.last_lateral_n) = (force, side);
+    }
+
+    /// The means of a cycle; the static compression goes a share of the way to where the load is carried.
+    pub(super) fn balanced(&mut self, contact: &Contact, sums: &Sums, share: f64) -> Cycle {
+        let cycle = Cycle {
+            lateral_n: sums.lateral * contact.frequency_hz,
+            normal_n: sums.normal * contact.frequency_hz,
+            contact: sums.touched as f64 / self.steps as f64,
+        };
+        let slope = contact.normal_stiffness_n_per_m * cycle.contact.max(0.15);
+        self.preload_m += share * (contact.normal_force_n - cycle.normal_n) / slope;
+        cycle
     }
 }
 

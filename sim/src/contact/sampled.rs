@@ -66,12 +66,7 @@ fn preload_m(contact: &Contact, heights: &[f64]) -> f64 {
         heights.iter().map(|h| one(preload + h * spread)).sum::<f64>() / heights.len() as f64
     };
     let reach = 1.0 + contact.motion.second_harmonic.abs() + 1.5 * spread;
-    let (mut low, mut high) = (-reach, target + reach);
-    for _ in 0..40 {
-        let middle = 0.5 * (low + high);
-        if mean(middle) < target { low = middle } else { high = middle }
-    }
-    0.5 * (low + high) * a
+    models::root::bisection([-reach, target + reach], 40, |preload| mean(preload) < target) * a
 }
 
 /// The plate's normal motion over its amplitude.

@@ -4,7 +4,5 @@ use super::*;
 
 pub(super) const KIND: Kind = Kind {
     act: Act::Setup(|_, config| config.amplifier.refuses_off = true),
-    ..Kind::fault(Place::Plate,
-        "the amplifier ignores its enable input once its output is on",
-    )
+    ..Kind::fault(Place::Plate, "the amplifier ignores its enable input once its output is on")
 };

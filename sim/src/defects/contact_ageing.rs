@@ -5,7 +5,5 @@ use super::*;
 pub(super) const KIND: Kind = Kind {
     parameters: &[Parameter::log("half_time_s", 1e-8, 3e-5)],
     act: Act::Contact(|v, _, contact| contact.limit.dwell_s = v[0]),
-    ..Kind::cause(Place::Contact,
-        "the friction limit of a fresh contact grows with its age",
-    )
+    ..Kind::cause(Place::Contact, "the friction limit of a fresh contact grows with its age")
 };

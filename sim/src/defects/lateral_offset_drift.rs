@@ -9,9 +9,7 @@ pub(super) const KIND: Kind = Kind {
         Parameter::log("time_s", 40.0, 600.0),
     ],
     act: Act::Forces(act),
-    ..Kind::cause(Place::Instrument,
-        "the zero of the lateral force is off and drifts",
-    )
+    ..Kind::cause(Place::Instrument, "the zero of the lateral force is off and drifts")
 };
 
 fn act(v: &Values, at: &Surroundings, forces: &mut Forces) {

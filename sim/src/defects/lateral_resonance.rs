@@ -6,7 +6,8 @@ pub(super) const KIND: Kind = Kind {
     parameters: &[Parameter::log("strength", 0.02, 1.0), Parameter::log("resonance_hz", 3e4, 5e4)],
     in_library: false,
     act: Act::Contact(act),
-    ..Kind::cause(Place::Finger,
+    ..Kind::cause(
+        Place::Finger,
         "the lateral stiffness of the ridges depends on frequency as a resonance does",
     )
 };

@@ -7,9 +7,7 @@ use super::*;
 pub(super) const KIND: Kind = Kind {
     parameters: &[Parameter::log("area_share", 0.01, 0.95)],
     act: Act::Contact(act),
-    ..Kind::cause(Place::Contact,
-        "part of the friction limit grows as the 2/3 power of the force",
-    )
+    ..Kind::cause(Place::Contact, "part of the friction limit grows as the 2/3 power of the force")
 };
 
 /// Force at which the share leaves the friction as it was (N).

@@ -6,7 +6,5 @@ use super::*;
 pub(super) const KIND: Kind = Kind {
     parameters: &[Parameter::log("height_sd_m", 5e-9, 1.5e-6)],
     act: Act::Contact(|v, _, contact| contact.ridge.height_sd_m = v[0]),
-    ..Kind::cause(Place::Contact,
-        "ridges of unequal height leave the plate one after another",
-    )
+    ..Kind::cause(Place::Contact, "ridges of unequal height leave the plate one after another")
 };

@@ -12,9 +12,7 @@ pub(super) const KIND: Kind = Kind {
         Parameter::linear("fall_per_50_mm_s", 0.0, 0.8),
     ],
     act: Act::Contact(act),
-    ..Kind::cause(Place::Contact,
-        "the coefficient of friction depends on the sliding speed",
-    )
+    ..Kind::cause(Place::Contact, "the coefficient of friction depends on the sliding speed")
 };
 
 const REFERENCE_M_S: f64 = 0.02;

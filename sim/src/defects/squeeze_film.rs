@@ -14,9 +14,7 @@ pub(super) const KIND: Kind = Kind {
         Parameter::log("asperity_load_n", 0.5, 3.0),
     ],
     act: Act::Contact(act),
-    ..Kind::cause(Place::Contact,
-        "air trapped between ridges and plate carries part of the load",
-    )
+    ..Kind::cause(Place::Contact, "air trapped between ridges and plate carries part of the load")
 };
 
 /// Mean free path of air at one atmosphere (m).

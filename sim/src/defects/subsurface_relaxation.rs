@@ -10,9 +10,7 @@ pub(super) const KIND: Kind = Kind {
         Parameter::linear("lateral_over_normal", 0.2, 1.5),
     ],
     act: Act::Contact(act),
-    ..Kind::cause(Place::Contact,
-        "the tissue under the ridges creeps with the time in contact",
-    )
+    ..Kind::cause(Place::Contact, "the tissue under the ridges creeps with the time in contact")
 };
 
 fn act(v: &Values, at: &Surroundings, contact: &mut Contact) {

@@ -211,48 +211,43 @@ impl Units {
         let counted = |count: u16| {
             if (1..=125).contains(&count) { Ok(count) } else { Err(ExceptionCode::IllegalDataValue) }
         };
-        match request {
-            Request::ReadHoldingRegisters(address, count) => device
-                .read(Table::Holding, address, counted(count)?, &mut *plant, now)
-                .map(Response::ReadHoldingRegisters)
-                .map_err(refused),
-            Request::ReadInputRegisters(address, count) => device
-                .read(Table::Input, address, counted(count)?, &mut *plant, now)
-                .map(Response::ReadInputRegisters)
-                .map_err(refused),
-            Request::ReadCoils(address, count) => device
-                .read(Table::Coil, address, counted(count)?, &mut *plant, now)
-                .map(|coils| Response::ReadCoils(bits(&coils)))
-                .map_err(refused),
-            Request::ReadDiscreteInputs(address, count) => device
-                .read(Table::Discrete, address, counted(count)?, &mut *plant, now)
-                .map(|inputs| Response::ReadDiscreteInputs(bits(&inputs)))
-                .map_err(refused),
-            Request::WriteSingleCoil(address, closed) => device
-                .write(Table::Coil, address, &[u16::from(closed)], &mut *plant)
-                .map(|()| Response::WriteSingleCoil(address, closed))
-                .map_err(refused),
-            Request::WriteMultipleCoils(address, coils) => {
-                let count = counted(u16::try_from(coils.len()).unwrap_or(u16::MAX))?;
-                let words: Vec<u16> = coils.iter().map(|closed| u16::from(*closed)).collect();
-                device
-                    .write(Table::Coil, address, &words, &mut *plant)
-                    .map(|()| Response::WriteMultipleCoils(address, count))
-                    .map_err(refused)
+        let listed = |length: usize| counted(u16::try_from(length).unwrap_or(u16::MAX));
+        let mut read = |table, address, count| {
+            device.read(table, address, counted(count)?, &mut *plant, now).map_err(refused)
+        };
+        let (table, address, words, done) = match request {
+            Request::ReadHoldingRegisters(at, count) => {
+                return read(Table::Holding, at, count).map(Response::ReadHoldingRegisters);
             }
-            Request::WriteSingleRegister(address, word) => device
-                .write(Table::Holding, address, &[word], &mut *plant)
-                .map(|()| Response::WriteSingleRegister(address, word))
-                .map_err(refused),
-            Request::WriteMultipleRegisters(address, words) => {
-                let count = counted(u16::try_from(words.len()).unwrap_or(u16::MAX))?;
-                device
-                    .write(Table::Holding, address, &words, &mut *plant)
-                    .map(|()| Response::WriteMultipleRegisters(address, count))
-                    .map_err(refused)
+            Request::ReadInputRegisters(at, count) => {
+                return read(Table::Input, at, count).map(Response::ReadInputRegisters);
             }
-            _ => Err(ExceptionCode::IllegalFunction),
-        }
+            Request::ReadCoils(at, count) => {
+                return read(Table::Coil, at, count).map(|coils| Response::ReadCoils(bits(&coils)));
+            }
+            Request::ReadDiscreteInputs(at, count) => {
+                return read(Table::Discrete, at, count)
+                    .map(|inputs| Response::ReadDiscreteInputs(bits(&inputs)));
+            }
+            Request::WriteSingleCoil(at, closed) => {
+                (Table::Coil, at, vec![u16::from(closed)], Response::WriteSingleCoil(at, closed))
+            }
+            Request::WriteMultipleCoils(at, coils) => {
+                let words = coils.iter().map(|closed| u16::from(*closed)).collect();
+                (Table::Coil, at, words, Response::WriteMultipleCoils(at, listed(coils.len())?))
+            }
+            Request::WriteSingleRegister(at, word) => {
+                (Table::Holding, at, vec![word], Response::WriteSingleRegister(at, word))
+            }
+            Request::WriteMultipleRegisters(at, words) => (
+                Table::Holding,
+                at,
+                words.to_vec(),
+                Response::WriteMultipleRegisters(at, listed(words.len())?),
+            ),
+            _ => return Err(ExceptionCode::IllegalFunction),
+        };
+        device.write(table, address, &words, &mut *plant).map(|()| done).map_err(refused)
     }
 }
 
