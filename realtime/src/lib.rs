@@ -2,7 +2,7 @@
 //!
 //! | module | purpose |
 //! |---|---|
-//! | [`ports`] | the seams `ForceSensor`, `Amplifier`, `Stage`, `SupplySwitch`, `SafetyInputs`; `Reading`, and `NoData` with its reason |
+//! | [`ports`], `signals` | the seams `ForceSensor`, `Amplifier`, `Stage`, `SupplySwitch`, `SafetyInputs`; `Reading`, and `NoData` with its reason |
 //! | [`cycle`] | pure `step`: commands, safety, estimate, comparison |
 //! | [`safety`] | limits, the state machine, the only maker of a [`safety::DriveCommand`] |
 //! | [`estimate`] | `mu`, `mu'` with uncertainty and age; means over a pass |
@@ -12,7 +12,7 @@
 //! | [`pacing`] | the thread: absolute deadlines, lateness histogram; in `pacing/machine.rs` what it asks of the machine |
 //! | [`clock`] | time of drivers, loop and virtual world; a virtual rig's can be held |
 //! | [`queue`] | commands to the loop; a stop waits behind nothing |
-//! | [`wrap`] | ports around ports: faults |
+//! | [`fault`] | ports around ports that the loop cannot tell from bare ones: faults |
 //! | [`stall_monitor`] | records when ordinary threads of the machine could not run |
 //! | [`replay`] | recorded cycles through the same code again |
 //! | [`recorder`], `number` | rows, passes, events as MCAP, infinite numbers too; tolerant reading, recovery |
@@ -35,6 +35,7 @@ pub mod clock;
 pub mod compare;
 pub mod cycle;
 pub mod estimate;
+pub mod fault;
 mod number;
 pub mod pacing;
 pub mod ports;
@@ -43,6 +44,6 @@ pub mod recorder;
 pub mod render;
 pub mod replay;
 pub mod safety;
+mod signals;
 pub mod stall_monitor;
 pub mod turn;
-pub mod wrap;

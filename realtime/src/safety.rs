@@ -24,7 +24,9 @@ mod limits;
 mod rules;
 mod watch;
 
-use crate::ports::{AmplifierState, Contacts, Forces, Nanos, NoData, StageState, SupplyCommand, SupplyState};
+use crate::signals::{
+    AmplifierState, Contacts, Forces, Nanos, NoData, StageState, SupplyCommand, SupplyState,
+};
 use models::quantity::PeakToPeak;
 use serde::{Deserialize, Serialize};
 

@@ -5,8 +5,8 @@
 
 use std::collections::VecDeque;
 
+use realtime::fault::FaultMode;
 use realtime::ports::Nanos;
-use realtime::wrap::fault::FaultMode;
 use serde::de::Error;
 use serde::{Deserialize, Deserializer, Serialize};
 

@@ -7,7 +7,7 @@
 use super::cause::{Cause, Unit};
 use super::rules::Breach;
 use super::{Decision, Safety, State, Trip};
-use crate::ports::{Nanos, NoData, SupplyCommand, SupplyState};
+use crate::signals::{Nanos, NoData, SupplyCommand, SupplyState};
 
 /// Time within which the second channel must show the commanded state: ten times a contactor's, and a poll.
 pub(super) const SUPPLY_ACTS: Nanos = Nanos(500_000_000);

@@ -3,7 +3,7 @@
 //! commanded instead.
 #![deny(clippy::disallowed_types, clippy::disallowed_methods)]
 
-use crate::ports::Nanos;
+use crate::signals::Nanos;
 
 /// Commands and readings of one stretch of time.
 #[derive(Clone, Copy, Debug, Default)]

@@ -4,7 +4,7 @@
 //! length. The hour is held in minutes: a minute counts until the whole of it is more than an hour ago, so no
 //! pause resets anything early. What an earlier run did is carried over from a ledger.
 
-use crate::ports::Nanos;
+use crate::signals::Nanos;
 use serde::{Deserialize, Serialize};
 
 /// Minutes that are remembered, the present one included: 60 whole ones and the one that runs.

@@ -1,6 +1,6 @@
 //! The numbers: hard limits that no configuration can raise, and the soft limits of a setup.
 
-use crate::ports::Nanos;
+use crate::signals::Nanos;
 use models::quantity::PeakToPeak;
 use serde::{Deserialize, Serialize};
 
@@ -227,41 +227,17 @@ pub struct Limits {
 
 /// A limit that a setup may not have.
 #[derive(Clone, Copy, Debug, PartialEq, thiserror::Error)]
+#[allow(missing_docs, reason = "the message of an error says what its fields are")]
 pub enum LimitError {
     /// Above what is compiled in.
     #[error("{name} = {value} is above the hard limit {hard}, which no setup can raise")]
-    AboveHard {
-        /// Name of the limit, with its unit.
-        name: &'static str,
-        /// What the setup says.
-        value: f64,
-        /// The hard limit.
-        hard: f64,
-    },
+    AboveHard { name: &'static str, value: f64, hard: f64 },
     /// Not a usable number.
     #[error("{name} = {value}: {needed} is needed")]
-    Unusable {
-        /// Name of the limit, with its unit.
-        name: &'static str,
-        /// What the setup says.
-        value: f64,
-        /// What would be accepted.
-        needed: &'static str,
-    },
+    Unusable { name: &'static str, value: f64, needed: &'static str },
     /// Outside its hard range.
     #[error("{name} = {value}: {low} to {high} is permitted ({why}), and no setup can widen that")]
-    OutOfRange {
-        /// Name of the limit, with its unit.
-        name: &'static str,
-        /// What the setup says.
-        value: f64,
-        /// Smallest value permitted.
-        low: f64,
-        /// Largest value permitted.
-        high: f64,
-        /// The reason for the range.
-        why: &'static str,
-    },
+    OutOfRange { name: &'static str, value: f64, low: f64, high: f64, why: &'static str },
 }
 
 impl LimitError {

@@ -4,7 +4,7 @@ use super::arming::{CutFor, SUPPLY_ACTS};
 use super::cause::{Cause, Unit};
 use super::watch::{ForceWatch, STAGE_RESPONSE, Watch};
 use super::{Controls, HARD, Limits, Observation, Remark, Request};
-use crate::ports::{AmplifierState, Channel, Contact, Nanos, NoData, SupplyCommand};
+use crate::signals::{AmplifierState, Channel, Contact, Nanos, NoData, SupplyCommand};
 
 /// A rule and what it is for.
 #[derive(Clone, Copy)]

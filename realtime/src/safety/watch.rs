@@ -3,7 +3,7 @@
 use super::envelope::Envelope;
 use super::exposure::Exposure;
 use super::{ChannelTiming, Controls, Decision, Limits, Observation};
-use crate::ports::{Channel, Nanos, NoData, Quality, Reading, SupplyCommand};
+use crate::signals::{Channel, Nanos, NoData, Quality, Reading, SupplyCommand};
 
 /// Memory of one force channel.
 #[derive(Clone, Copy, Debug, Default)]

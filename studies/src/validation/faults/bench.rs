@@ -13,11 +13,11 @@ use models::quantity::PeakToPeak;
 use models::target::Target;
 use realtime::cycle::{Command, Config, Marker, Phase};
 use realtime::estimate::{EstimateConfig, Mu0};
+use realtime::fault::{Fault, FaultMode, FaultyAmplifier, FaultyForce, FaultyStage};
 use realtime::ports::Nanos;
 use realtime::replay::replay;
 use realtime::safety::{Cause, Exposed, Limits, Request, Trip};
 use realtime::turn::{Ports, Row};
-use realtime::wrap::fault::{Fault, FaultMode, FaultyAmplifier, FaultyForce, FaultyStage};
 use serde::{Deserialize, Serialize};
 use sim::amplifier::AmplifierInput;
 use sim::virtual_rig::{SharedRig, VirtualRig};
@@ -564,7 +564,7 @@ impl Watch {
 /// readback of twice the amplitude right, and its heartbeat feeds the watchdog that a cut link would have let
 /// fire. What then counts is the slower of the two bounds, from the later strike on.
 fn interact(scene: &Scene) -> bool {
-    use realtime::wrap::fault::Target;
+    use realtime::fault::Target;
     let amplifier = |s: &Strike| {
         matches!(
             ROWS[s.row].what,
@@ -595,11 +595,10 @@ pub fn measured_bound(scene: &Scene) -> u64 {
         // A fresh state must show it, ten cycles of patience, then the supply is cut.
         let state_age = scene.pace.timing(T, RING).amplifier.age_limit().0.div_ceil(T.0);
         // States that are garbage say by turns that the output is on and that it is off: the first 'on' after that time counts.
-        let garbage = has(|w| {
-            matches!(w, What::Channel(realtime::wrap::fault::Target::Amplifier, FaultMode::Garbage, ..))
-        });
+        let garbage =
+            has(|w| matches!(w, What::Channel(realtime::fault::Target::Amplifier, FaultMode::Garbage, ..)));
         state_age + 10 + ring_cycles() + if garbage { 20 } else { 0 }
-    } else if has(|w| matches!(w, What::Channel(realtime::wrap::fault::Target::Drive, ..))) {
+    } else if has(|w| matches!(w, What::Channel(realtime::fault::Target::Drive, ..))) {
         WATCHDOG + ring_cycles()
     } else {
         ring_cycles()

@@ -7,9 +7,9 @@
 //! plausible by chance, so its bound allows for that. Two spikes side by side are an overforce.
 
 use super::tamper::Tamper;
+use realtime::fault::{FaultMode, Target};
 use realtime::ports::Nanos;
 use realtime::safety::{Cause, ChannelTiming, Limits, Timing};
-use realtime::wrap::fault::{FaultMode, Target};
 use serde::{Deserialize, Serialize};
 
 /// What the rig is doing when a fault strikes.

@@ -71,7 +71,7 @@ pub fn scene_of(seed: u64, pairs: bool, pace: Pace) -> Scene {
 /// channel twice, or alters what an instrument shows before a channel loses it, is judged one by one only.
 fn compatible(a: usize, b: usize) -> bool {
     use super::rows::What::{Channel, Paused, Shown};
-    use realtime::wrap::fault::Target;
+    use realtime::fault::Target;
     let share = ROWS[a].moments.iter().any(|m| ROWS[b].moments.contains(m));
     let apart = match (ROWS[a].what, ROWS[b].what) {
         (Channel(one, ..), Channel(other, ..)) => {

@@ -85,9 +85,20 @@ where
     }
 }
 
+/// What only a reading can show.
+const EXTRA: [FaultMode; 7] = [
+    FaultMode::Invalid,
+    FaultMode::Corrupt,
+    FaultMode::Disconnected,
+    FaultMode::Spikes,
+    FaultMode::Saturated,
+    FaultMode::Disordered,
+    FaultMode::ClockJump,
+];
+
 #[test]
 fn the_strengths_are_those_that_the_words_name() {
-    for mode in FaultMode::PX4.into_iter().chain(FaultMode::EXTRA) {
+    for mode in FaultMode::PX4.into_iter().chain(EXTRA) {
         let strength = mode.default_strength();
         match mode {
             FaultMode::Wrong => assert_eq!(strength, -0.5),

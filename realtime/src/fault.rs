@@ -2,7 +2,7 @@
 //!
 //! The vocabulary is that of PX4's failure injection (ok, off, stuck, garbage, wrong, slow, delayed,
 //! intermittent), the same in virtual time, on the wire and in a defects file. A few words are added for what
-//! only a reading can show ([`FaultMode::EXTRA`]); the virtual rig's instruments know PX4's alone. A wrapper
+//! only a reading can show; the virtual rig's instruments know PX4's alone. A wrapper
 //! is plain data around its port: no heap, no lock, and its random numbers come from a seed.
 #![deny(clippy::disallowed_types, clippy::disallowed_methods)]
 
@@ -51,26 +51,10 @@ pub enum FaultMode {
 
 impl FaultMode {
     /// The words that PX4 has.
-    pub const PX4: [FaultMode; 8] = [
-        FaultMode::Ok,
-        FaultMode::Off,
-        FaultMode::Stuck,
-        FaultMode::Garbage,
-        FaultMode::Wrong,
-        FaultMode::Slow,
-        FaultMode::Delayed,
-        FaultMode::Intermittent,
-    ];
-    /// What only a reading can show.
-    pub const EXTRA: [FaultMode; 7] = [
-        FaultMode::Invalid,
-        FaultMode::Corrupt,
-        FaultMode::Disconnected,
-        FaultMode::Spikes,
-        FaultMode::Saturated,
-        FaultMode::Disordered,
-        FaultMode::ClockJump,
-    ];
+    pub const PX4: [FaultMode; 8] = {
+        use FaultMode::*;
+        [Ok, Off, Stuck, Garbage, Wrong, Slow, Delayed, Intermittent]
+    };
 
     /// Strength where none is given.
     pub const fn default_strength(self) -> f64 {
@@ -213,24 +197,16 @@ impl Sample for AmplifierState {
         self.echoed_frequency_hz = earlier.echoed_frequency_hz;
     }
     fn spoil(&mut self, dice: &mut Dice) {
-        if let Ok(amplitude) = &mut self.amplitude {
-            amplitude.value = garbage(dice) * 1e-6;
-        }
+        self.amplitude.iter_mut().for_each(|a| a.value = garbage(dice) * 1e-6);
         self.echoed_frequency_hz = garbage(dice) * 1e3;
         self.output_on = dice.bits() & 1 == 0;
-        if let Ok(temperature) = &mut self.temperature_c {
-            temperature.value = garbage(dice);
-        }
+        self.temperature_c.iter_mut().for_each(|t| t.value = garbage(dice));
     }
     fn scale(&mut self, factor: f64) {
-        if let Ok(amplitude) = &mut self.amplitude {
-            amplitude.scale(factor);
-        }
+        self.amplitude.iter_mut().for_each(|a| a.scale(factor));
     }
     fn saturate(&mut self) {
-        if let Ok(amplitude) = &mut self.amplitude {
-            amplitude.saturate();
-        }
+        self.amplitude.iter_mut().for_each(Sample::saturate);
     }
     fn move_clock(&mut self, seconds: f64) {
         self.taken_at = moved(self.taken_at, seconds);
@@ -353,20 +329,10 @@ impl<S: Sample> Line<S> {
                     Ok(sample) => sample,
                     Err(_) => return false,
                 });
-                if let Ok(sample) = out {
-                    sample.hold(&held);
-                }
+                out.iter_mut().for_each(|sample| sample.hold(&held));
             }
-            FaultMode::Garbage => {
-                if let Ok(sample) = out {
-                    sample.spoil(&mut self.dice);
-                }
-            }
-            FaultMode::Wrong => {
-                if let Ok(sample) = out {
-                    sample.scale(fault.strength);
-                }
-            }
+            FaultMode::Garbage => out.iter_mut().for_each(|sample| sample.spoil(&mut self.dice)),
+            FaultMode::Wrong => out.iter_mut().for_each(|sample| sample.scale(fault.strength)),
             FaultMode::Slow => {
                 if !fresh || self.count.is_multiple_of((fault.strength.max(1.0)) as u64) {
                     return false;
@@ -387,35 +353,21 @@ impl<S: Sample> Line<S> {
             FaultMode::Corrupt => *out = Err(NoData::Corrupt),
             FaultMode::Disconnected => *out = Err(NoData::Disconnected),
             FaultMode::Spikes => {
-                let due = if self.spiked {
-                    self.count.is_multiple_of((fault.strength.max(1.0)) as u64)
-                } else {
-                    true
-                };
-                if !fresh || !due {
+                let due = self.count.is_multiple_of((fault.strength.max(1.0)) as u64);
+                if !fresh || (self.spiked && !due) {
                     return false;
                 }
                 self.spiked = true;
-                if let Ok(sample) = out {
-                    sample.scale(100.0);
-                }
+                out.iter_mut().for_each(|sample| sample.scale(100.0));
             }
-            FaultMode::Saturated => {
-                if let Ok(sample) = out {
-                    sample.saturate();
-                }
-            }
+            FaultMode::Saturated => out.iter_mut().for_each(Sample::saturate),
             FaultMode::Disordered => {
                 if !fresh || self.count.is_multiple_of(2) {
                     return false;
                 }
                 *out = self.back(3).ok_or(NoData::NeverRead);
             }
-            FaultMode::ClockJump => {
-                if let Ok(sample) = out {
-                    sample.move_clock(fault.strength);
-                }
-            }
+            FaultMode::ClockJump => out.iter_mut().for_each(|sample| sample.move_clock(fault.strength)),
         }
         true
     }

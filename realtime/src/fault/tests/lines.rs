@@ -86,7 +86,7 @@ fn stuck_stands_still_while_counters_and_clocks_go_on() {
 /// A line that is down has no value that could stand still.
 #[test]
 fn what_is_missing_stays_missing_under_a_fault() {
-    for mode in FaultMode::PX4.into_iter().chain(FaultMode::EXTRA) {
+    for mode in FaultMode::PX4.into_iter().chain(EXTRA) {
         let sensor = Port {
             state: |now: Nanos| match now.0 / T {
                 0..=4 => Forces { lateral: Ok(nth(now.0 / T)), normal: Err(NoData::NotFitted) },
