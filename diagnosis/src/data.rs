@@ -56,6 +56,8 @@ fn read_twice(passes: &[&Pass]) -> Option<[u64; 2]> {
     knows_time.then_some([twice[0].3, twice[1].3])
 }
 
+/// Least guess of mu0 where no pass has the plate still.
+const LEAST_MU0: f64 = 0.05;
 /// Relative difference below which two frequencies are one.
 const SAME_FREQUENCY: f64 = 1e-3;
 /// Range of temperatures below which a table shows nothing of them, K.
@@ -216,6 +218,20 @@ impl Table {
             }
         }
         (bottom > 0.0 && top > 0.0).then(|| top / bottom)
+    }
+
+    /// mu_0 before any fit. Without still passes the largest friction seen is the best first word on it.
+    pub(crate) fn nominal_mu0(&self) -> f64 {
+        let seen = self.passes.iter().zip(&self.lateral);
+        let seen = seen.map(|(p, l)| p.direction.sign() * l / p.normal_force_n);
+        self.still_coefficient().unwrap_or_else(|| seen.fold(LEAST_MU0, f64::max))
+    }
+
+    /// Rows in the order of measurement, run by run.
+    pub(crate) fn order(&self) -> Vec<usize> {
+        let mut rows: Vec<usize> = (0..self.len()).collect();
+        rows.sort_by_key(|&i| self.runs[i]);
+        rows
     }
 
     /// The first need of an effect that this table does not meet, in words.

@@ -5,11 +5,11 @@
 //! function may be any smooth one: the mechanism stays, the formula goes.
 
 use crate::constants::Constants;
-use crate::evidence::recalibration;
 use crate::fit::Problem;
 use crate::kernel::{Coordinates, Kernel, Lengths, form_lengths};
 use crate::layout::{Layout, NUISANCES};
 use crate::member::Member;
+use crate::recalibration::Recalibration;
 use models::condition::Condition;
 use models::covariate::{Covariate, Role, SMOOTH};
 use nalgebra::{DMatrix, DVector};
@@ -165,8 +165,9 @@ impl Change {
         if members.is_empty() {
             return Change::none(problem.len());
         }
-        let (raw, jacobian, shift) = recalibration(problem, u, prediction);
-        let net = &raw - &jacobian * shift;
+        let recalibrated = Recalibration::of(problem, u, prediction);
+        let net = recalibrated.net();
+        let Recalibration { raw, jacobian, .. } = recalibrated;
         let mut bent = Vec::new();
         for (i, member) in members.iter().enumerate().filter(|_| freedom.bend > 0.0) {
             let (Some(acts), Some(_)) = (effects::at(member.effect).acts, basis.of(member.effect)) else {
@@ -306,7 +307,7 @@ mod tests {
         let bent = laplace(&problem, &members, &fit.u, &basis, bent, 6);
         let gained = bent.log_evidence - alone.log_evidence;
         assert!(gained > 3.0, "{gained:.1} nats");
-        let shift = recalibration(&problem, &bent.u, &bent.prediction).2;
+        let shift = Recalibration::of(&problem, &bent.u, &bent.prediction).shift;
         let again = bent.change.at(&problem, &members, &bent.u, &bent.prediction, &shift);
         let [here, there] = [&bent.change, &again].map(|c| c.columns(&basis, bent.freedom.share));
         assert!((&here - &there).amax() < 1e-9 * here.amax());

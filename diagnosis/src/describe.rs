@@ -36,6 +36,15 @@ pub struct Description {
     pub text: String,
 }
 
+/// A probability as it can be read: neither certainty nor impossibility is claimed.
+pub fn probability(p: f64) -> String {
+    match p {
+        p if p > 0.999 => "> 0.999".into(),
+        p if p < 0.001 => "< 0.001".into(),
+        p => format!("{p:.3}"),
+    }
+}
+
 /// A number with three significant digits.
 fn three_digits(value: f64) -> String {
     let scale = 10f64.powi(2 - value.abs().max(1e-300).log10().floor() as i32);

@@ -6,7 +6,7 @@
 use crate::constants::Constants;
 use crate::data::Table;
 use crate::fit::Problem;
-use crate::gaussian::{Covariance, Scaled, log_sum_exp};
+use crate::gaussian::{Covariance, HALF_LN_2PI, Scaled, log_sum_exp};
 use crate::kernel::{COUNT, Coordinates, Kernel, Lengths};
 use crate::layout::NUISANCES;
 use models::condition::Condition;
@@ -176,8 +176,8 @@ impl Discrepancy {
                         _ => 1.0,
                     });
                     let Some(parts) = Scaled::new(&gram, &score, sizes.collect()) else { continue };
-                    let value = -0.5 * (chi - parts.explained + log_det + parts.log_det)
-                        - n as f64 * 0.918_938_533_204_672_8;
+                    let value =
+                        -0.5 * (chi - parts.explained + log_det + parts.log_det) - n as f64 * HALF_LN_2PI;
                     all.push(value);
                     if value > best.0 {
                         best = (value, friction, odd, white);

@@ -7,7 +7,7 @@
 use crate::constants::Constants;
 use crate::departure::{Basis, Change, Freedom};
 use crate::fit::{Member, Problem};
-use crate::gaussian::{Covariance, log_sum_exp};
+use crate::gaussian::{Covariance, HALF_LN_2PI, log_sum_exp};
 use crate::layout::{Layout, NUISANCES};
 use crate::least_squares::{Fit, bounded_step, carry};
 use effects::Prior;
@@ -69,35 +69,6 @@ impl Posterior {
     pub fn pull(&self) -> f64 {
         self.u[..NUISANCES].iter().map(|x| x * x).sum()
     }
-}
-
-/// The effect's change net of recalibration: `m - m0` less what the nuisances, under their priors, can take up.
-pub fn net_change(problem: &Problem, u: &[f64], prediction: &DVector<f64>) -> DVector<f64> {
-    let (raw, jacobian, shift) = recalibration(problem, u, prediction);
-    raw - jacobian * shift
-}
-
-/// Raw change, the baseline's nuisance Jacobian, and the recalibration that imitates the change best.
-pub fn recalibration(
-    problem: &Problem,
-    u: &[f64],
-    prediction: &DVector<f64>,
-) -> (DVector<f64>, DMatrix<f64>, DVector<f64>) {
-    let nuisance = &u[..NUISANCES];
-    let baseline = problem.predict(&[], nuisance);
-    let jacobian = problem.jacobian(&[], nuisance, &baseline);
-    let raw = prediction - &baseline;
-    let mut weighted = jacobian.clone();
-    for (i, v) in problem.variance.iter().enumerate() {
-        for k in 0..NUISANCES {
-            weighted[(i, k)] /= *v;
-        }
-    }
-    let t = weighted.transpose();
-    let hessian = &t * &jacobian + DMatrix::identity(NUISANCES, NUISANCES);
-    let target = &t * &raw - DVector::from_column_slice(nuisance);
-    let shift = hessian.cholesky().map_or_else(|| DVector::zeros(NUISANCES), |c| c.solve(&target));
-    (raw, jacobian, shift)
 }
 
 /// Improves a fit under the covariance of one freedom and gives its evidence. `members` may be empty (no
@@ -215,7 +186,7 @@ fn log_half_line(reach: f64, beyond: f64) -> f64 {
     let z = reach - beyond;
     // ln(exp(b^2/2) Phi(z)); for large b the two nearly cancel: Mills' ratio.
     if z < MILLS {
-        0.5 * beyond * beyond - 0.5 * z * z - (-z).ln() - 0.918_938_533_204_672_8 - (1.0 / (z * z))
+        0.5 * beyond * beyond - 0.5 * z * z - (-z).ln() - HALF_LN_2PI - (1.0 / (z * z))
     } else {
         0.5 * beyond * beyond + (0.5 * erfc(-z / std::f64::consts::SQRT_2)).max(1e-300).ln()
     }

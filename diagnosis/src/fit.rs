@@ -2,7 +2,7 @@
 
 use crate::constants::Constants;
 use crate::data::RigFile;
-use crate::gaussian::Covariance;
+use crate::gaussian::{Covariance, HALF_LN_2PI};
 use crate::law::Law;
 use crate::layout::{Layout, NUISANCES};
 pub use crate::member::Member;
@@ -16,10 +16,6 @@ use std::sync::Arc;
 const STEPS: [f64; 2] = [1e-3, 2e-3];
 /// Farthest coordinate of a nuisance that a fit may take, in deviations of its prior.
 const FARTHEST_NUISANCE: f64 = 40.0;
-/// Half the logarithm of two pi.
-const HALF_LN_2PI: f64 = 0.918_938_533_204_672_8;
-/// Least guess of mu0 where no pass has the plate still.
-const LEAST_MU0: f64 = 0.05;
 /// Certified deviations below this share of a law's own prior are taken as this: closer to exact than any
 /// table can tell, and still a number to divide by.
 const EXACT: f64 = 1e-6;
@@ -55,14 +51,6 @@ pub struct Problem {
     /// Of each pass: force of the base law beside the nominal spring-slider's, and the law's uncertainty, N.
     /// Empty without a law.
     pub beside: Vec<[f64; 2]>,
-}
-
-/// mu_0 of a table before any fit. Without still passes the largest friction seen is the best first word on
-/// it.
-pub fn nominal_mu0(table: &crate::data::Table) -> f64 {
-    let seen =
-        table.passes.iter().zip(&table.lateral).map(|(p, l)| p.direction.sign() * l / p.normal_force_n);
-    table.still_coefficient().unwrap_or_else(|| seen.fold(LEAST_MU0, f64::max))
 }
 
 /// Instrument errors that no table of passes tells from another baseline, with the logarithmic change of the
@@ -106,7 +94,7 @@ impl Problem {
             common: DMatrix::zeros(table.len(), 0),
             design: table.design,
             nominal: Baseline {
-                mu0: nominal_mu0(table),
+                mu0: table.nominal_mu0(),
                 normal_stiffness_n_per_m: rig.finger.normal_stiffness_n_per_m,
                 lateral_stiffness_n_per_m: rig.finger.lateral_stiffness_n_per_m,
             },

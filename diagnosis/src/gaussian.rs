@@ -2,6 +2,9 @@
 
 use nalgebra::{Cholesky, DMatrix, DVector, Dyn};
 
+/// Half the logarithm of two pi.
+pub const HALF_LN_2PI: f64 = 0.918_938_533_204_672_8;
+
 /// Inverse and determinant of `diag(var) + Phi Phi'` by Woodbury.
 pub struct Covariance {
     inverse_sd: DVector<f64>,

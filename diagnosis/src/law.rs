@@ -6,7 +6,6 @@
 //! are left out and named.
 
 use crate::data::Table;
-use crate::fit::nominal_mu0;
 use effects::corrected::SavedLaw;
 use effects::{Baseline, Design};
 use models::condition::Condition;
@@ -66,7 +65,7 @@ impl Law {
         text: Option<String>,
         table: &Table,
     ) -> Result<(Law, Table), CannotTell> {
-        let mu0 = nominal_mu0(table);
+        let mu0 = table.nominal_mu0();
         let tells = |i: &usize| model.predict(&Condition { mu0, ..table.passes[*i] });
         let (within, without): (Vec<usize>, Vec<usize>) = (0..table.len()).partition(|i| tells(i).is_ok());
         let left_out = without.iter().map(|i| table.points[*i]).collect();

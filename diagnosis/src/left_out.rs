@@ -2,12 +2,13 @@
 
 use crate::constants::Constants;
 use crate::departure::Freedom;
-use crate::evidence::{Posterior, laplace, net_change, recalibration};
+use crate::evidence::{Posterior, laplace};
 use crate::fit::{Member, Problem};
 use crate::fitted::Fitted;
 use crate::gaussian::Covariance;
 use crate::layout::Layout;
 use crate::least_squares::{Fit, minimise};
+use crate::recalibration::Recalibration;
 use models::condition::Condition;
 use models::covariate::{AMBIENT_PRESSURE, AMPLITUDE, Covariate, FREQUENCY, NORMAL_FORCE, SPEED, TIME};
 use nalgebra::{DMatrix, DVector};
@@ -146,7 +147,7 @@ fn left_out_bent(
     let freedom = Freedom { share: 0.0, ..best.freedom };
     let [others, rows] = rows;
     let refit = laplace(rest, &best.members, &best.u, &fitted.basis.select(others), freedom, ROUNDS);
-    let shift = recalibration(rest, &refit.u, &refit.prediction).2;
+    let shift = Recalibration::of(rest, &refit.u, &refit.prediction).shift;
     let plain = out.predict(&best.members, &refit.u);
     let there = refit.change.at(out, &best.members, &refit.u, &plain, &shift);
     let expected = plain + there.columns(&fitted.basis.select(rows), 0.0) * &refit.departure;
@@ -192,7 +193,7 @@ fn tells_nothing(problem: &Problem, rest: &Problem, best: &Posterior) -> bool {
     let chi2 = |p: &Problem, change: &DVector<f64>| -> f64 {
         change.iter().zip(&p.variance).map(|(c, v)| c * c / v).sum()
     };
-    let there = net_change(rest, &best.u, &rest.predict(&best.members, &best.u));
+    let there = Recalibration::of(rest, &best.u, &rest.predict(&best.members, &best.u)).net();
     chi2(rest, &there) < problem.constants.informed_share * chi2(problem, &best.change.net)
 }
 

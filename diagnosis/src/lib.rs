@@ -10,6 +10,7 @@
 //! | [`gaussian`], [`kernel`] | Gaussian algebra of low rank; smooth functions over the operating space |
 //! | [`departure`] | how a hypothesis may depart from its form: smoothly, and by bending what its cause acts on |
 //! | [`evidence`] | marginal likelihood by Laplace's method, with that departure |
+//! | [`recalibration`] | what recalibrating the baseline imitates of a change |
 //! | [`discrepancy`] | the open set: a Gaussian-process discrepancy of the baseline |
 //! | [`starts`], [`singles`], [`pairs`], [`hypotheses`] | global starts; one cause, two causes, all with their probabilities |
 //! | [`left_out`] | extrapolation to left-out regions of the operating space |
@@ -77,6 +78,7 @@ pub mod predict;
 pub mod progress;
 pub mod pulls;
 pub mod reading;
+pub mod recalibration;
 pub mod remarks;
 mod run_shifts;
 pub mod saved;

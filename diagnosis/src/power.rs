@@ -1,8 +1,9 @@
 //! From which size of each effect this table would claim a gap. docs/diagnosis/model.md, section 10.
 
-use crate::evidence::{Posterior, net_change};
+use crate::evidence::Posterior;
 use crate::fitted::{Candidate, Fitted};
 use crate::layout::Layout;
+use crate::recalibration::Recalibration;
 use serde::Serialize;
 
 /// The size of an effect from which a table like this would claim a gap.
@@ -23,7 +24,7 @@ pub struct SeenFrom {
 }
 
 /// Halvings of the range of a size.
-const HALVINGS: usize = 24;
+const HALVINGS: u32 = 24;
 
 /// Each single effect that was tried, most visible first.
 ///
@@ -55,21 +56,11 @@ fn by_law(fitted: &Fitted, law: &Posterior, threshold: f64) -> SeenFrom {
     let change = |size: f64| {
         let mut u = law.u.clone();
         u[place] = size;
-        net_change(problem, &u, &problem.predict(&law.members, &u))
+        Recalibration::of(problem, &u, &problem.predict(&law.members, &u)).net()
     };
     let seen = |size: f64| 0.5 * problem.chi2(&change(size)) > threshold;
-    let (mut low, mut high) = (0.0, parameter.coordinate_bounds().1);
-    let found = seen(high).then(|| {
-        for _ in 0..HALVINGS {
-            let middle = 0.5 * (low + high);
-            if seen(middle) {
-                high = middle;
-            } else {
-                low = middle;
-            }
-        }
-        high
-    });
+    let most = parameter.coordinate_bounds().1;
+    let found = seen(most).then(|| models::root::halved([0.0, most], HALVINGS, |size| !seen(size))[1]);
     let rms = |size: f64| {
         let squares = change(size);
         let over = squares.iter().zip(problem.full_friction()).map(|(c, full)| (c / full).powi(2));

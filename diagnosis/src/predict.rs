@@ -4,11 +4,12 @@ use crate::data::{RigFile, Table};
 use crate::decision::Verdict;
 use crate::departure::Freedom;
 use crate::discrepancy::{Discrepancy, lengths};
-use crate::evidence::{Posterior, laplace, recalibration};
+use crate::evidence::{Posterior, laplace};
 use crate::fit::Problem;
 use crate::fitted::Fitted;
 use crate::layout::NUISANCES;
 use crate::least_squares::minimise;
+use crate::recalibration::Recalibration;
 use crate::structure::laid::Laid;
 use models::condition::Condition;
 use nalgebra::{DMatrix, DVector};
@@ -151,7 +152,7 @@ pub fn model(fitted: &Fitted, table: &Table, answer: &Answer, rows: Option<&[usi
         Which::Baseline => Part::Baseline,
         Which::Cause(i) => {
             let best = Box::new(refit(&fitted.candidates[i].best));
-            let shift = recalibration(&problem, &best.u, &best.prediction).2;
+            let shift = Recalibration::of(&problem, &best.u, &best.prediction).shift;
             let departure = departure_covariance(fitted, &problem, &best);
             Part::Effects { best, shift, departure }
         }

@@ -2,9 +2,9 @@
 
 use crate::data::{RigFile, Table};
 use crate::decision::{Decision, Verdict, decide};
+use crate::describe::probability;
 use crate::hypotheses::{Fitted, Options, fit_believing};
 use crate::scatter::{Belief, Scatter};
-use crate::verdict::probability;
 use models::covariate::{AMPLITUDE, Role, SMOOTH};
 use models::quantity::PeakToPeak;
 use serde::Serialize;

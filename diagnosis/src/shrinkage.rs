@@ -41,6 +41,16 @@ pub struct Gap {
     pub unexplained_share: Option<f64>,
 }
 
+impl Gap {
+    /// How far it shrinks, for a sentence: the verb, by how many per cent, and the interval of that.
+    pub fn change(&self) -> Option<(&'static str, f64, Option<[f64; 2]>)> {
+        let share = self.shrinkage?;
+        let turned = |[low, high]: [f64; 2]| if share < 0.0 { [-high, -low] } else { [low, high] };
+        let interval = self.shrinkage_ci95.map(|ends| turned(ends).map(|end| 100.0 * end));
+        Some((if share < 0.0 { "grows" } else { "shrinks" }, 100.0 * share.abs(), interval))
+    }
+}
+
 /// Groups that are held out together: runs where there are at least three, else blocks of like conditions.
 pub fn groups(table: &Table, folds: usize) -> Vec<usize> {
     if table.run_count >= 3 {

@@ -2,7 +2,7 @@
 
 use crate::data::{RigFile, Table};
 use crate::decision::{Decision, Verdict, decide};
-use crate::describe::{Description, at_least, description};
+use crate::describe::{Description, at_least, description, probability};
 use crate::hypotheses::{Fitted, Options, fit_all};
 use crate::intervals::{Estimate, curvature, estimates};
 use crate::law::LawNote;
@@ -259,29 +259,17 @@ fn label(fitted: &Fitted, candidate: usize) -> String {
     fitted.candidates[candidate].names().join("+")
 }
 
-/// A probability as it can be read: neither certainty nor impossibility is claimed.
-pub fn probability(p: f64) -> String {
-    match p {
-        p if p > 0.999 => "> 0.999".into(),
-        p if p < 0.001 => "< 0.001".into(),
-        p => format!("{p:.3}"),
-    }
-}
-
 fn sentence(fitted: &Fitted, decision: &Decision, gap: &Gap, answer: &Answer) -> String {
     let closed = |with: &str| {
-        let Some(share) = gap.shrinkage else {
+        let Some((verb, percent, interval)) = gap.change() else {
             return match gap.before_rmse {
                 Some(_) => "passes that were not fitted show no gap".to_string(),
                 None => "the table is too short to keep passes out of the fit".to_string(),
             };
         };
         // A share without its interval claims more than the passes can show.
-        let within = gap.shrinkage_ci95.map_or_else(String::new, |[low, high]| {
-            let [low, high] = if share < 0.0 { [-high, -low] } else { [low, high] };
-            format!(" (95 %: {:.0} to {:.0})", 100.0 * low, 100.0 * high)
-        });
-        let (verb, percent) = (if share < 0.0 { "grows" } else { "shrinks" }, 100.0 * share.abs());
+        let within =
+            interval.map_or_else(String::new, |[low, high]| format!(" (95 %: {low:.0} to {high:.0})"));
         format!("with {with} the gap {verb} by {percent:.0} %{within} on passes that were not fitted")
     };
     let leader = decision.leader().unwrap_or_default();

@@ -5,8 +5,9 @@ pub mod files;
 
 use crate::report::human::{quantity, with_interval};
 use diagnosis::certificates;
+use diagnosis::describe::probability;
 use diagnosis::intervals::{Estimate, Shape};
-use diagnosis::verdict::{Diagnosis, Hypothesis, probability};
+use diagnosis::verdict::{Diagnosis, Hypothesis};
 use miette::IntoDiagnostic;
 use models::condition::Condition;
 use models::covariate::{self, Covariate};

@@ -6,9 +6,10 @@
 use crate::data::RigFile;
 use crate::decision::Decision;
 use crate::departure::Basis;
-use crate::evidence::{Posterior, recalibration};
+use crate::evidence::Posterior;
 use crate::fit::Problem;
 use crate::fitted::Fitted;
+use crate::recalibration::Recalibration;
 use models::condition::Condition;
 use nalgebra::{DMatrix, DVector};
 use rayon::prelude::*;
@@ -92,7 +93,7 @@ fn expected(fitted: &Fitted, grid: &Problem, basis: &Basis, e: &Posterior) -> (D
     let (mut seen, mut planned) = (there.insert_columns(d, r, 0.0), here.insert_columns(d, r, 0.0));
     let mut mean = plain.clone();
     if r > 0 {
-        let (_, _, shift) = recalibration(problem, &e.u, &e.prediction);
+        let shift = Recalibration::of(problem, &e.u, &e.prediction).shift;
         let columns = e.change.at(grid, &e.members, &e.u, &plain, &shift).columns(basis, e.freedom.share);
         mean += &columns * &e.departure;
         seen.columns_mut(d, r).copy_from(&e.change.columns(&fitted.basis, e.freedom.share));

@@ -8,13 +8,6 @@ use crate::data::Table;
 use nalgebra::DMatrix;
 use std::f64::consts::PI;
 
-/// Rows in the order of measurement, run by run.
-fn order(table: &Table) -> Vec<usize> {
-    let mut rows: Vec<usize> = (0..table.len()).collect();
-    rows.sort_by_key(|&i| table.runs[i]);
-    rows
-}
-
 /// Largest places on the grids of size and correlation that the runs of a table are long enough for.
 #[derive(Debug, Clone, Copy, PartialEq, Default)]
 pub struct Bounds {
@@ -45,19 +38,28 @@ pub fn modes(k: &Constants, n: usize) -> usize {
 
 /// The slowest cosines over the passes in the order of measurement; none of a table too short for them.
 pub fn cosines(k: &Constants, table: &Table) -> DMatrix<f64> {
-    let n = table.len();
-    let mut place = vec![0.0; n];
-    for (at, i) in order(table).into_iter().enumerate() {
-        place[i] = (at as f64 + 0.5) / n as f64;
-    }
-    DMatrix::from_fn(n, modes(k, n), |i, j| (PI * j as f64 * place[i]).cos())
+    let place = places(table);
+    DMatrix::from_fn(table.len(), modes(k, table.len()), |i, j| (PI * j as f64 * place[i]).cos())
 }
 
-/// Variance of each cosine of an autoregression of unit variance over n passes (Priestley 1981, section 6.2).
+/// Place of each pass in the order of measurement, 0 to 1.
+pub(super) fn places(table: &Table) -> Vec<f64> {
+    let mut place = vec![0.0; table.len()];
+    for (at, i) in table.order().into_iter().enumerate() {
+        place[i] = (at as f64 + 0.5) / table.len() as f64;
+    }
+    place
+}
+
+/// Power of a cosine of an autoregression over n passes, in units of independent scatter (Priestley 1981,
+/// section 6.2).
+pub(super) fn power(rho: f64, n: usize, mode: usize) -> f64 {
+    (1.0 - rho * rho) / (1.0 - 2.0 * rho * (PI * mode as f64 / n as f64).cos() + rho * rho)
+}
+
+/// Variance of each cosine of an autoregression of unit variance over n passes.
 pub fn powers(rho: f64, n: usize, modes: usize) -> Vec<f64> {
-    let power =
-        |j: usize| (1.0 - rho * rho) / (1.0 - 2.0 * rho * (PI * j as f64 / n as f64).cos() + rho * rho);
-    (0..modes).map(|j| power(j) * if j == 0 { 1.0 } else { 2.0 } / n as f64).collect()
+    (0..modes).map(|j| power(rho, n, j) * if j == 0 { 1.0 } else { 2.0 } / n as f64).collect()
 }
 
 #[cfg(test)]

@@ -7,6 +7,7 @@
 use crate::constants::Constants;
 use crate::data::Table;
 use crate::fit::Problem;
+use crate::scatter::lasting;
 use nalgebra::DMatrix;
 use std::f64::consts::PI;
 
@@ -15,13 +16,6 @@ const VALUES: [f64; 9] = [0.1, 0.2, 0.3, 0.4, 0.5, 0.6, 0.7, 0.8, 0.9];
 /// Fewest differences for a search for correlation.
 const FEWEST: usize = 24;
 
-/// Rows in the order of measurement, run by run.
-fn order(table: &Table) -> Vec<usize> {
-    let mut rows: Vec<usize> = (0..table.len()).collect();
-    rows.sort_by_key(|&i| table.runs[i]);
-    rows
-}
-
 /// Correlation of the scatter of neighbours, from residuals in deviations of a pass; zero unless it is
 /// probable.
 ///
@@ -29,7 +23,7 @@ fn order(table: &Table) -> Vec<usize> {
 /// their ratio less one is the correlation, whatever drifts slowly beside it. Its deviation for independent
 /// passes is the root of 2 / n. A priori the correlation is zero with probability one half.
 pub fn correlation(k: &Constants, table: &Table, residual: &[f64]) -> f64 {
-    let rows = order(table);
+    let rows = table.order();
     let apart = |lag: usize| {
         let same =
             rows.windows(lag + 1).map(|w| (w[0], w[lag])).filter(|(a, b)| table.runs[*a] == table.runs[*b]);
@@ -58,15 +52,10 @@ pub fn columns(rho: f64, table: &Table, problem: &Problem, inflation: &[f64]) ->
     if rho <= 0.0 || modes == 0 {
         return (1.0, DMatrix::zeros(n, 0));
     }
-    // Power of each cosine in units of independent scatter (Priestley 1981, section 6.2).
-    let power =
-        |k: usize| (1.0 - rho * rho) / (1.0 - 2.0 * rho * (PI * k as f64 / n as f64).cos() + rho * rho);
+    let power = |k: usize| lasting::power(rho, n, k);
     let slow: f64 = (0..modes).map(power).sum();
     let share = ((n as f64 - slow) / (n - modes) as f64).max(0.1);
-    let mut place = vec![0.0; n];
-    for (at, i) in order(table).into_iter().enumerate() {
-        place[i] = (at as f64 + 0.5) / n as f64;
-    }
+    let place = lasting::places(table);
     let columns = DMatrix::from_fn(n, modes, |i, k| {
         let norm = if k == 0 { 1.0 } else { 2.0 } / n as f64;
         let excess = (power(k) - share).max(0.0);

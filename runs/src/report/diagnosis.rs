@@ -17,9 +17,10 @@ use super::plots::verdict::{Seen, errors_against};
 use crate::verdict::plain;
 use diagnosis::Verdict;
 use diagnosis::data::Table;
+use diagnosis::describe::probability;
 use diagnosis::left_out::Errors;
 use diagnosis::predict::Forecast;
-use diagnosis::verdict::{Diagnosis, probability};
+use diagnosis::verdict::Diagnosis;
 use models::covariate;
 
 /// Parts of the operating space that the page lists, the largest first.
@@ -87,14 +88,10 @@ fn how_far(result: &Diagnosis) -> String {
             )
         })
         .collect();
-    let words = match (g.shrinkage, g.shrinkage_ci95) {
-        (Some(s), Some([low, high])) => format!(
-            "The removable gap {} by {:.0} % (95 % interval {:.0} to {:.0} %).",
-            if s < 0.0 { "grows" } else { "shrinks" },
-            100.0 * s.abs(),
-            100.0 * if s < 0.0 { -high } else { low },
-            100.0 * if s < 0.0 { -low } else { high }
-        ),
+    let words = match g.change() {
+        Some((verb, percent, Some([low, high]))) => {
+            format!("The removable gap {verb} by {percent:.0} % (95 % interval {low:.0} to {high:.0} %).")
+        }
         _ if g.before_rmse.is_none() => "The table is too short to hold passes out.".to_string(),
         _ => "The recalibrated baseline is within its own sampling error of repeatability: no gap to shrink."
             .to_string(),

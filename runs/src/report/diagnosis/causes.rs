@@ -5,7 +5,8 @@ use super::mechanism::drawing;
 use super::overlay::Overlay;
 use crate::report::html::{bar, columns, escape, table};
 use crate::verdict::{EXPLAINED, aliases, estimate, plain};
-use diagnosis::verdict::{Diagnosis, Hypothesis, probability};
+use diagnosis::describe::probability;
+use diagnosis::verdict::{Diagnosis, Hypothesis};
 
 /// Probability from which a hypothesis is listed.
 const LISTED: f64 = 0.002;

@@ -46,7 +46,7 @@ pub fn section(result: &Diagnosis) -> miette::Result<String> {
                 format!(
                     "<tr><th scope=\"row\">{}</th><td class=\"n\">{}</td><td class=\"n\">{late}</td><td class=\"n\">{sd}</td></tr>",
                     form(f.form),
-                    diagnosis::verdict::probability(f.probability)
+                    diagnosis::describe::probability(f.probability)
                 )
             })
             .collect();
