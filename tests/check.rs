@@ -46,7 +46,11 @@ impl Made {
         assert_eq!(verdict.status.code(), Some(0), "{}", texts(&verdict).1);
         std::fs::write(made.at("verdict.json"), &verdict.stdout).unwrap();
         std::fs::write(made.at("rig.toml"), RIG).unwrap();
-        std::fs::write(made.at("setup.toml"), runs::setup::bundled_text("virtual-ideal").unwrap()).unwrap();
+        std::fs::write(
+            made.at("setup.toml"),
+            runs::bundled::text(runs::setup::BUNDLED, "virtual-ideal").unwrap(),
+        )
+        .unwrap();
         std::fs::write(made.at("tip.toml"), runs::fingertip::BUNDLED[0].1).unwrap();
         std::fs::write(made.at("profile.toml"), drivers::bundled::text("muprime-force2").unwrap()).unwrap();
         made

@@ -171,7 +171,7 @@ impl Campaign {
             }
         }
         wrong.end()?;
-        let plan = match crate::plan::bundled_text(&file.plan) {
+        let plan = match crate::bundled::text(crate::plan::BUNDLED, &file.plan) {
             Some(text) => Plan::parse(&file.plan, text)?,
             None => Plan::load(&folder.join(&file.plan).display().to_string())?,
         };
@@ -209,7 +209,7 @@ impl Campaign {
 impl Cell {
     /// Its setup, with the fingertip that the cell names.
     fn setup(&self, folder: &Path) -> miette::Result<Setup> {
-        let (origin, text, beside) = match crate::setup::bundled_text(&self.setup) {
+        let (origin, text, beside) = match crate::bundled::text(crate::setup::BUNDLED, &self.setup) {
             Some(text) => (self.setup.clone(), text.to_string(), folder.to_path_buf()),
             None => {
                 let path = folder.join(&self.setup);

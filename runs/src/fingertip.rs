@@ -1,6 +1,6 @@
 //! The fingertip library: size, material, moduli, springs, each with its source.
 
-use crate::input;
+use crate::{bundled, input};
 use models::finger::Finger;
 use serde::{Deserialize, Serialize};
 use std::path::Path;
@@ -110,13 +110,10 @@ impl Fingertip {
     /// # Errors
     /// A tip that is not there or not usable, in words.
     pub fn resolve(setup: &FingertipSetup, folder: &Path) -> Result<Self, String> {
-        let bundled =
-            BUNDLED.iter().find(|(name, _)| *name == setup.tip).map(|(_, text)| (*text).to_string());
-        let text = match bundled {
-            Some(text) => text,
+        let text = match bundled::text(BUNDLED, &setup.tip) {
+            Some(text) => text.to_string(),
             None => input::text_of(&folder.join(&setup.tip)).map_err(|e| {
-                let known: Vec<_> = BUNDLED.iter().map(|(name, _)| *name).collect();
-                format!("no fingertip '{}' ({e}); bundled: {}", setup.tip, known.join(", "))
+                format!("no fingertip '{}' ({e}); bundled: {}", setup.tip, bundled::names(BUNDLED))
             })?,
         };
         let file: FingertipFile =

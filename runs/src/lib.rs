@@ -8,6 +8,7 @@
 //! | [`input`], [`quantity`], [`files`] | files of people, refused with their place; units; files that are written |
 //! | [`mod@print`], [`leave`], [`version`] | how the program prints, and ends; the build and its models |
 //! | [`setup`], [`plan`], [`fingertip`] | rigs, plans, fingertips, all checked with the place in the file |
+//! | [`bundled`] | those that come with the program, by name |
 //! | [`calibrate`] | certificates from data; what only instruments give comes through a bench |
 //! | [`campaign`] | one plan with several tips, conditions and days; what the paper states, answered |
 //! | [`certificates`], [`model_file`] | a setup's certificates, verified and applied once; a corrected model from its file to the loop |
@@ -35,6 +36,7 @@
 #![deny(clippy::print_stdout, clippy::print_stderr)]
 
 pub mod ambient;
+pub mod bundled;
 pub mod calibrate;
 pub mod campaign;
 pub mod catalogue;

@@ -14,9 +14,8 @@ use models::covariate::{self, Covariate};
 use models::quantity::PeakToPeak;
 use serde::{Deserialize, Serialize};
 use std::collections::BTreeMap;
-use std::path::Path;
 
-pub use bundled::{BUNDLED, text as bundled_text};
+pub use bundled::BUNDLED;
 pub(crate) use points::series_place;
 pub use points::{PlanProblem, Point, Resolution};
 pub use reach::{Reach, times};
@@ -80,18 +79,9 @@ impl PlanFile {
     /// Passes that the plan asks for, references left out, counted without making them.
     fn passes(&self) -> u64 {
         let of_series = |s: &Series| {
-            let lists = [
-                s.amplitude_pp_m.len(),
-                s.frequency_hz.len(),
-                s.speed_m_s.len(),
-                s.normal_force_n.len(),
-                s.position_m.len(),
-                s.ambient_pressure_pa.len(),
-                s.temperature_c.len(),
-                s.relative_humidity_pct.len(),
-            ];
             let directions = if s.directions.is_empty() { &self.directions } else { &s.directions };
-            let conditions = lists.iter().fold(1u64, |all, n| all.saturating_mul((*n).max(1) as u64));
+            let sizes = s.lists().map(|(_, list)| list.len().max(1) as u64);
+            let conditions = sizes.into_iter().fold(1, u64::saturating_mul);
             conditions.saturating_mul(directions.len() as u64)
         };
         let conditions = self.series.iter().map(of_series).fold(0, u64::saturating_add);
@@ -260,18 +250,7 @@ impl Plan {
     /// # Errors
     /// What is wrong, with the place in the file.
     pub fn load(name_or_path: &str) -> miette::Result<Self> {
-        if let Some(text) = bundled::text(name_or_path) {
-            return Self::parse(name_or_path, text);
-        }
-        let path = Path::new(name_or_path);
-        if !path.exists() {
-            let known: Vec<_> = BUNDLED.iter().map(|(name, _)| *name).collect();
-            miette::bail!(
-                help = format!("bundled plans: {}", known.join(", ")),
-                "there is no plan '{name_or_path}', neither bundled nor as a file"
-            );
-        }
-        Self::parse(name_or_path, &input::text_of(path)?)
+        Self::parse(name_or_path, &crate::bundled::load("plan", BUNDLED, name_or_path)?.0)
     }
 
     /// Parses and checks a plan by itself. Against limits it is checked by [`Plan::points`].

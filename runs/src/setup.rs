@@ -22,7 +22,7 @@ use realtime::safety::Exposed;
 use serde::{Deserialize, Serialize};
 use std::path::{Path, PathBuf};
 
-pub use bundled::{BUNDLED, text as bundled_text};
+pub use bundled::BUNDLED;
 pub use limits::LimitsFile;
 pub use profiles::{library, look_in};
 
@@ -231,18 +231,8 @@ impl Setup {
     /// # Errors
     /// What is wrong, with the place in the file.
     pub fn load(name_or_path: &str) -> miette::Result<Self> {
-        if let Some(text) = bundled::text(name_or_path) {
-            return Self::parse(name_or_path, text, Path::new("."));
-        }
-        let path = Path::new(name_or_path);
-        if !path.exists() {
-            let known: Vec<_> = BUNDLED.iter().map(|(name, _)| *name).collect();
-            miette::bail!(
-                help = format!("bundled setups: {}", known.join(", ")),
-                "there is no setup '{name_or_path}', neither bundled nor as a file"
-            );
-        }
-        Self::parse(name_or_path, &input::text_of(path)?, path.parent().unwrap_or(Path::new(".")))
+        let (text, folder) = crate::bundled::load("setup", BUNDLED, name_or_path)?;
+        Self::parse(name_or_path, &text, folder)
     }
 
     /// Parses and checks a setup.

@@ -8,8 +8,3 @@ pub const BUNDLED: &[(&str, &str)] = &[
     ("render-grating", include_str!("../../plans/render-grating.toml")),
     ("psi-reading", include_str!("../../plans/psi-reading.toml")),
 ];
-
-/// Text of the bundled plan of that name.
-pub fn text(name: &str) -> Option<&'static str> {
-    BUNDLED.iter().find(|(n, _)| *n == name).map(|(_, text)| *text)
-}

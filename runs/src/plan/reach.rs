@@ -67,7 +67,9 @@ mod tests {
 
     #[test]
     fn what_an_instrument_does_not_take_is_refused_with_its_name_and_all_at_once() {
-        let plan = Plan::parse("first-sweep", super::super::bundled_text("first-sweep").unwrap()).unwrap();
+        let plan =
+            Plan::parse("first-sweep", crate::bundled::text(crate::plan::BUNDLED, "first-sweep").unwrap())
+                .unwrap();
         let reach = |column, range, by: &str| Reach { column, range, by: by.into() };
         plan.check_reach(&[reach("frequency_hz", [15e3, 80e3], "`a` takes")]).unwrap();
         let refused = plan

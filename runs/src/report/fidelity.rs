@@ -1,6 +1,6 @@
 //! What a page and a terminal say of a rendered target.
 
-use super::html::{escape, list, note, table};
+use super::html::{columns, escape, list, note, table};
 use super::human::{number, quantity};
 use super::plots::fidelity::{key, over_position, transfer};
 use crate::fidelity::{Fidelity, Group, Late};
@@ -92,10 +92,10 @@ pub fn lines(fidelity: &Fidelity) -> Vec<String> {
 /// # Errors
 /// Only if the drawing library fails.
 pub(super) fn section(fidelity: &Fidelity) -> miette::Result<String> {
-    const HEAD: &str = "<th scope=\"col\">U, mm/s</th><th scope=\"col\">load, N</th><th scope=\"col\">passes</th>\
-        <th scope=\"col\">&mu;' off, rms</th><th scope=\"col\">mean</th><th scope=\"col\">within tolerance</th>\
-        <th scope=\"col\">shift, mm</th><th scope=\"col\">rms without it</th><th scope=\"col\">loop and plate, rms</th>\
-        <th scope=\"col\">law and sensor, rms</th><th scope=\"col\">not to be had</th><th scope=\"col\">where it ends</th>";
+    let head = columns(
+        "U, mm/s|load, N|passes|&mu;' off, rms|mean|within tolerance|shift, mm|rms without it|\
+         loop and plate, rms|law and sensor, rms|not to be had|where it ends",
+    );
     let row = |g: &Group| {
         format!(
             "<tr><td>{:.1}</td><td>{}</td><td>{}</td><td>{:.3}</td><td>{:+.3}</td><td>{:.0} %</td><td>{}</td><td>{:.3}</td>\
@@ -135,7 +135,7 @@ pub(super) fn section(fidelity: &Fidelity) -> miette::Result<String> {
     let remarks = if remarks.is_empty() { String::new() } else { list(&remarks, "") };
     Ok(format!(
         "<h2>Rendered friction</h2>{}{remarks}<div class=\"panels\">{figures}</div>{}{}{}",
-        table("Fidelity by speed", HEAD, &rows),
+        table("Fidelity by speed", &head, &rows),
         note(
             "Grey: wanted &mu;'. Dashed: predicted by the law at the amplitude read back. Line and band: measured, with twice the \
              standard deviation over the repeats. The shift is the way by which the measurement comes after the target, forward and backward."

@@ -10,6 +10,7 @@ pub mod run;
 pub mod verdict;
 
 use super::html::escape;
+use models::psi::{self, PsiEq17};
 use plotters::coord::combinators::LogCoord;
 use plotters::coord::ranged1d::{KeyPointHint, NoDefaultFormatting, ValueFormatter};
 use plotters::coord::types::RangedCoordf64;
@@ -36,6 +37,8 @@ const WIDE: (u32, u32) = (900, 460);
 const NARROW: (u32, u32) = (360, 320);
 /// The same for one of several side by side.
 const PANEL: (u32, u32) = (400, 280);
+/// Title of an axis of amplitudes.
+const AMPLITUDE: &str = "amplitude w, \u{b5}m peak to peak";
 
 fn wrong(e: impl std::fmt::Display) -> miette::Report {
     miette::miette!("a figure: {e}")
@@ -148,22 +151,17 @@ impl ValueFormatter<f64> for Axis {
 
 type Chart<'a> = ChartContext<'a, SVGBackend<'a>, Cartesian2d<Axis, Axis>>;
 
-/// What a figure is: its sizes, its axes with their titles, and what it shows in one sentence for who cannot
-/// see it.
-struct Frame<'a> {
-    sizes: [(u32, u32); 2],
-    x: (Span, &'a str),
-    y: (Span, &'a str),
-    alt: &'a str,
-}
-
-/// A figure as SVG, wide and narrow; `draw` puts the curves in and gets the size of a mark.
+/// A figure as SVG, wide and narrow: its wide size, its axes with their titles, and what it shows in one
+/// sentence for who cannot see it. `draw` puts the curves in and gets the size of a mark.
 fn figure(
-    frame: &Frame<'_>,
+    wide: (u32, u32),
+    x: (Span, &str),
+    y: (Span, &str),
+    alt: &str,
     draw: impl for<'a> Fn(&mut Chart<'a>, u32) -> miette::Result<()>,
 ) -> miette::Result<String> {
     let mut text = String::new();
-    for (class, size) in ["wide", "narrow"].iter().zip(frame.sizes) {
+    for (class, size) in [("wide", wide), ("narrow", NARROW)] {
         let mut svg = String::new();
         {
             let area = SVGBackend::with_string(&mut svg, size).into_drawing_area();
@@ -172,7 +170,7 @@ fn figure(
                 .margin(10)
                 .x_label_area_size(3 * letters)
                 .y_label_area_size(4 * letters)
-                .build_cartesian_2d(frame.x.0.axis(), frame.y.0.axis())
+                .build_cartesian_2d(x.0.axis(), y.0.axis())
                 .map_err(wrong)?;
             chart
                 .configure_mesh()
@@ -180,8 +178,8 @@ fn figure(
                 .bold_line_style(BLACK.mix(0.12))
                 .x_labels((size.0 / 75) as usize)
                 .y_labels((size.1 / 45) as usize)
-                .x_desc(frame.x.1)
-                .y_desc(frame.y.1)
+                .x_desc(x.1)
+                .y_desc(y.1)
                 .label_style(("sans-serif", letters))
                 .draw()
                 .map_err(wrong)?;
@@ -192,8 +190,7 @@ fn figure(
         for default in [" opacity=\"1\"", " stroke=\"none\"", " stroke-width=\"1\""] {
             svg = svg.replace(default, "");
         }
-        let svg =
-            svg.replacen("<svg ", &format!("<svg role=\"img\" aria-label=\"{}\" ", escape(frame.alt)), 1);
+        let svg = svg.replacen("<svg ", &format!("<svg role=\"img\" aria-label=\"{}\" ", escape(alt)), 1);
         text.push_str(&format!("<div class=\"{class}\">{svg}</div>"));
     }
     Ok(text)
@@ -259,6 +256,15 @@ impl<C, DB: DrawingBackend> Drawable<DB> for Mark<C> {
     }
 }
 
+/// Draws elements one after another.
+fn draw<'a, E>(chart: &mut Chart<'a>, elements: impl IntoIterator<Item = E>) -> miette::Result<()>
+where
+    for<'b> &'b E: PointCollection<'b, (f64, f64)>,
+    E: Drawable<SVGBackend<'a>>,
+{
+    chart.draw_series(elements).map(|_| ()).map_err(wrong)
+}
+
 /// A line, whole or in dashes of so many pixels.
 fn line(
     chart: &mut Chart<'_>,
@@ -267,12 +273,21 @@ fn line(
     dash: Option<i32>,
 ) -> miette::Result<()> {
     match dash {
-        None => chart.draw_series(LineSeries::new(points, colour.stroke_width(2))).map_err(wrong)?,
-        Some(dash) => chart
-            .draw_series(DashedLineSeries::new(points, dash, dash, colour.stroke_width(2)))
-            .map_err(wrong)?,
-    };
-    Ok(())
+        None => draw(chart, LineSeries::new(points, colour.stroke_width(2))),
+        Some(dash) => draw(chart, DashedLineSeries::new(points, dash, dash, colour.stroke_width(2))),
+    }
+}
+
+/// The edge of a band: a curve of places, values and standard deviations, moved by `k` of them and cut at the
+/// ends of the axis.
+fn edge_of(curve: &[(f64, f64, f64)], k: f64, [low, high]: [f64; 2]) -> Vec<(f64, f64)> {
+    curve.iter().map(|(x, y, sd)| (*x, (y + k * sd).clamp(low, high))).collect()
+}
+
+/// Eq. 20 with this `Psi*` between two `Psi`.
+fn eq_20(low: f64, high: f64, star: f64) -> Vec<(f64, f64)> {
+    let grid = (0..=200).map(|k| low * (high / low).powf(f64::from(k) / 200.0));
+    grid.map(|p| (p, psi::relative_friction(PsiEq17(p), star))).collect()
 }
 
 /// A band between two lines of points.
@@ -283,10 +298,12 @@ fn band(
     colour: RGBColor,
 ) -> miette::Result<()> {
     let around: Vec<(f64, f64)> = high.iter().chain(low.iter().rev()).copied().collect();
-    if around.len() > 2 {
-        chart.draw_series([Polygon::new(around, colour.mix(0.16))]).map_err(wrong)?;
-    }
-    Ok(())
+    if around.len() > 2 { draw(chart, [Polygon::new(around, colour.mix(0.16))]) } else { Ok(()) }
+}
+
+/// The axis of `mu'` between two ends.
+fn mu_on([low, high]: [f64; 2]) -> (Span, &'static str) {
+    (Span::linear(low..high), "relative friction \u{3bc}'")
 }
 
 /// The axis of `mu'` over measured values: a mark is drawn where it was measured, but for a few that would
@@ -317,12 +334,10 @@ fn measured(
         let ends = [(y - sd).clamp(low, high), (y + sd).clamp(low, high)];
         PathElement::new(vec![(*x, ends[0]), (*x, ends[1])], colour.stroke_width(1))
     });
-    chart.draw_series(bars).map_err(wrong)?;
+    draw(chart, bars)?;
     let series = series.min(SERIES - 1);
     let filled = filled(series);
-    let marks = points.iter().map(|(x, y, _)| mark(series, (*x, y.clamp(low, high)), size, colour, filled));
-    chart.draw_series(marks).map_err(wrong)?;
-    Ok(())
+    draw(chart, points.iter().map(|(x, y, _)| mark(series, (*x, y.clamp(low, high)), size, colour, filled)))
 }
 
 /// How many series a figure can tell apart: the marks, and those that are not crosses once more, hollow.

@@ -10,8 +10,3 @@ pub const BUNDLED: &[(&str, &str)] = &[
     ("virtual-slcan", include_str!("../../setups/virtual-slcan.toml")),
     ("virtual-socketcan", include_str!("../../setups/virtual-socketcan.toml")),
 ];
-
-/// Text of the bundled setup of that name.
-pub fn text(name: &str) -> Option<&'static str> {
-    BUNDLED.iter().find(|(n, _)| *n == name).map(|(_, text)| *text)
-}

@@ -339,7 +339,7 @@ mod tests {
 
     #[test]
     fn all_that_is_misshapen_is_reported_at_once() {
-        let plan = runs::plan::bundled_text("first-sweep").unwrap();
+        let plan = runs::bundled::text(runs::plan::BUNDLED, "first-sweep").unwrap();
         assert_eq!(problems_of(Kind::Plan, plan), "");
         let wrong = plan
             .replacen("seed", "sead", 1)

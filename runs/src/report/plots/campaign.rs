@@ -1,7 +1,8 @@
 //! The figures of a campaign.
 
-use super::{COLOURS, Frame, GREY, NARROW, PANEL, Span, WIDE, band, figure, line, measured, wrong};
-use models::psi::{self, PsiEq17};
+use super::{
+    COLOURS, GREY, PANEL, Span, WIDE, band, draw, edge_of, eq_20, figure, filled, line, mark, measured, mu_on,
+};
 use models::reading::Reading;
 
 /// What one cell, or one model of it, puts into a figure.
@@ -23,18 +24,10 @@ const MU: [f64; 2] = [0.0, 1.15];
 pub fn against(axis: &str, logarithmic: bool, all: &[Series]) -> miette::Result<String> {
     let places = || all.iter().flat_map(|s| s.points.iter().map(|p| p.0));
     let alt = format!("Relative friction against {axis}: {} cells, measured and predicted.", all.len());
-    let frame = Frame {
-        sizes: [PANEL, NARROW],
-        x: (Span::over(places(), logarithmic), axis),
-        y: (Span::linear(MU[0]..MU[1]), "relative friction \u{3bc}'"),
-        alt: &alt,
-    };
-    figure(&frame, |chart, size| {
+    figure(PANEL, (Span::over(places(), logarithmic), axis), mu_on(MU), &alt, |chart, size| {
         for (i, series) in all.iter().enumerate() {
             let colour = COLOURS[i % COLOURS.len()];
-            let edge = |k: f64| -> Vec<(f64, f64)> {
-                series.slider.iter().map(|(x, m, s)| (*x, (m + k * s).clamp(MU[0], MU[1]))).collect()
-            };
+            let edge = |k: f64| edge_of(&series.slider, k, MU);
             band(chart, &edge(-2.0), &edge(2.0), colour)?;
             line(chart, edge(0.0), colour, None)?;
             line(chart, series.ridge.clone(), colour, Some(5))?;
@@ -48,17 +41,10 @@ pub fn against(axis: &str, logarithmic: bool, all: &[Series]) -> miette::Result<
 pub fn against_psi(all: &[(String, Vec<(f64, f64)>)]) -> miette::Result<String> {
     let places = || all.iter().flat_map(|(_, points)| points.iter().map(|p| p.0));
     let (low, high) = (places().fold(0.1, f64::min) * 0.8, places().fold(10.0, f64::max) * 1.2);
-    let frame = Frame {
-        sizes: [WIDE, NARROW],
-        x: (Span::logarithmic(low..high), "\u{3a8} of Eq. 17"),
-        y: (Span::linear(MU[0]..MU[1]), "relative friction \u{3bc}'"),
-        alt: "Relative friction against Psi, all passes of all cells, with Eq. 20.",
-    };
-    figure(&frame, |chart, size| {
-        let law = |star: f64| -> Vec<(f64, f64)> {
-            let grid = (0..=200).map(|k| low * (high / low).powf(f64::from(k) / 200.0));
-            grid.map(|p| (p, psi::relative_friction(PsiEq17(p), star))).collect()
-        };
+    let x = (Span::logarithmic(low..high), "\u{3a8} of Eq. 17");
+    let alt = "Relative friction against Psi, all passes of all cells, with Eq. 20.";
+    figure(WIDE, x, mu_on(MU), alt, |chart, size| {
+        let law = |star: f64| eq_20(low, high, star);
         for reading in Reading::ALL {
             let (star, sd) = reading.psi_star();
             band(chart, &law(star + sd), &law(star - sd), GREY)?;
@@ -66,16 +52,9 @@ pub fn against_psi(all: &[(String, Vec<(f64, f64)>)]) -> miette::Result<String> 
         }
         for (i, (_, points)) in all.iter().enumerate() {
             let colour = COLOURS[i % COLOURS.len()];
-            let marks = points.iter().map(|at| {
-                super::mark(
-                    i,
-                    (at.0, at.1.clamp(MU[0], MU[1])),
-                    size.saturating_sub(1),
-                    colour,
-                    super::filled(i),
-                )
-            });
-            chart.draw_series(marks).map_err(wrong)?;
+            let size = size.saturating_sub(1);
+            let cut = |at: &(f64, f64)| (at.0, at.1.clamp(MU[0], MU[1]));
+            draw(chart, points.iter().map(|at| mark(i, cut(at), size, colour, filled(i))))?;
         }
         Ok(())
     })

@@ -1,8 +1,8 @@
 //! The figures of two runs and of more.
 
 use super::{
-    COLOURS, Frame, GREY, NARROW, SERIES, Span, WIDE, band, beyond, capital, figure, line, mark_name,
-    measured, mu_axis, series_key,
+    AMPLITUDE, COLOURS, GREY, SERIES, Span, WIDE, band, beyond, capital, figure, line, mark_name, measured,
+    mu_axis, mu_on, series_key,
 };
 use crate::compare::groups::{GroupDifference, Grouped};
 use crate::compare::{Comparison, Mean, Paired};
@@ -19,17 +19,12 @@ pub fn overlay(result: &Comparison) -> miette::Result<String> {
         mark_name(0),
         mark_name(1)
     );
-    let frame = Frame {
-        sizes: [WIDE, NARROW],
-        x: (Span::linear(0.0..widest), "amplitude w, \u{b5}m peak to peak"),
-        y: (Span::linear(mu[0]..mu[1]), "relative friction \u{3bc}'"),
-        alt: &alt,
-    };
+    let x = (Span::linear(0.0..widest), AMPLITUDE);
     // A little beside each other, so that no mark hides the other one.
     let place =
         |p: &Paired, m: Mean, aside: f64| (p.amplitude_pp_m * 1e6 + aside * widest, m.mu_relative, m.sd);
     let (first, second) = (|p: &Paired| place(p, p.a, -0.003), |p: &Paired| place(p, p.b, 0.003));
-    let svg = figure(&frame, |chart, size| {
+    let svg = figure(WIDE, x, mu_on(mu), &alt, |chart, size| {
         for p in &result.pairs {
             let ends = [first(p), second(p)].map(|(x, y, _)| (x, y));
             line(chart, ends.to_vec(), GREY, None)?;
@@ -59,10 +54,9 @@ const FACTORS: [Factor; 3] = [
 /// vary by more than their uncertainty.
 pub fn differences(result: &Comparison) -> miette::Result<String> {
     let widest = widest(result);
-    let ends =
-        result.pairs.iter().flat_map(|p| [p.difference - p.difference_sd, p.difference + p.difference_sd]);
-    let (low, high) = ends.fold((-0.01, 0.01), |(l, h): (f64, f64), v| (l.min(v), h.max(v)));
-    let [low, high] = [low - 0.05 * (high - low), high + 0.05 * (high - low)];
+    let [low, high] = about_zero(
+        result.pairs.iter().flat_map(|p| [p.difference - p.difference_sd, p.difference + p.difference_sd]),
+    );
     let by = |(.., of, within): &Factor| Levels::of(result.pairs.iter().map(of), *within);
     let factor = FACTORS.iter().rev().max_by_key(|factor| by(factor).count()).unwrap_or(&FACTORS[0]);
     let (levels, (name, unit, of, _)) = (by(factor), factor);
@@ -70,16 +64,12 @@ pub fn differences(result: &Comparison) -> miette::Result<String> {
         "Difference of relative friction, second run less first, against amplitude: {} conditions, by {name}.",
         result.pairs.len()
     );
-    let frame = Frame {
-        sizes: [WIDE, NARROW],
-        x: (Span::linear(0.0..widest), "amplitude w, \u{b5}m peak to peak"),
-        y: (Span::linear(low..high), "difference of \u{3bc}', second less first"),
-        alt: &alt,
-    };
+    let (x, y) = (Span::linear(0.0..widest), Span::linear(low..high));
+    let (x, y) = ((x, AMPLITUDE), (y, "difference of \u{3bc}', second less first"));
     let level_of = |p: &Paired| levels.index(of(p)).min(SERIES - 1);
     let along = |value: f64| vec![(0.0, value), (widest, value)];
     let shift = result.judged.filter(|judged| !judged.varies());
-    let svg = figure(&frame, |chart, size| {
+    let svg = figure(WIDE, x, y, &alt, |chart, size| {
         if let Some(judged) = &shift {
             let [from, to] = judged.shift_interval_95.map(|v| v.clamp(low, high));
             band(chart, &along(from), &along(to), COLOURS[2])?;
@@ -104,6 +94,12 @@ pub fn differences(result: &Comparison) -> miette::Result<String> {
          Dashed: no difference.</figcaption></figure>",
         capital(&key)
     ))
+}
+
+/// An axis of differences with a margin.
+fn about_zero(ends: impl Iterator<Item = f64>) -> [f64; 2] {
+    let [low, high] = ends.fold([-0.01, 0.01], |[l, h]: [f64; 2], v| [l.min(v), h.max(v)]);
+    [low - 0.05 * (high - low), high + 0.05 * (high - low)]
 }
 
 fn widest(result: &Comparison) -> f64 {
@@ -145,21 +141,11 @@ fn by_group(
     }
     let widest = 1.05 * all().map(|p| p.0).fold(0.1, f64::max);
     let ends = all().flat_map(|p| [p.1 - p.2, p.1 + p.2]);
-    let span = if from == 0 {
-        mu_axis(ends)
-    } else {
-        let [low, high] = ends.fold([-0.01, 0.01], |[l, h]: [f64; 2], v| [l.min(v), h.max(v)]);
-        [low - 0.05 * (high - low), high + 0.05 * (high - low)]
-    };
+    let span = if from == 0 { mu_axis(ends) } else { about_zero(ends) };
     let alt =
         format!("{shown} against amplitude, {} marks of {} groups.", all().count(), points.len() - from);
-    let frame = Frame {
-        sizes: [WIDE, NARROW],
-        x: (Span::linear(0.0..widest), "amplitude w, \u{b5}m peak to peak"),
-        y: (Span::linear(span[0]..span[1]), axis),
-        alt: &alt,
-    };
-    let svg = figure(&frame, |chart, size| {
+    let (x, y) = ((Span::linear(0.0..widest), AMPLITUDE), (Span::linear(span[0]..span[1]), axis));
+    let svg = figure(WIDE, x, y, &alt, |chart, size| {
         if from > 0 {
             line(chart, vec![(0.0, 0.0), (widest, 0.0)], GREY, Some(4))?;
         }

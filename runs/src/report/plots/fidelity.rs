@@ -1,6 +1,6 @@
 //! The figures of a rendered target.
 
-use super::{COLOURS, Frame, GREY, NARROW, PANEL, Span, WIDE, band, figure, line, measured, series_key};
+use super::{COLOURS, GREY, PANEL, Span, WIDE, band, figure, line, measured, series_key};
 use crate::fidelity::{Group, Place};
 use crate::report::human::number;
 
@@ -14,13 +14,9 @@ pub fn over_position(places: &[Place], what: &str) -> miette::Result<String> {
     let edges = [of(|p| p.measured - 2.0 * p.measured_sd), of(|p| p.measured + 2.0 * p.measured_sd)];
     let values = edges.iter().flatten().map(|p| p.1).chain(places.iter().map(|p| p.wanted));
     let alt = format!("Wanted, predicted and measured relative friction over position, {what}.");
-    let frame = Frame {
-        sizes: [PANEL, NARROW],
-        x: (Span::over(places.iter().map(|p| p.x_m * 1e3), false), "position, mm"),
-        y: (Span::over(values, false), "relative friction \u{3bc}'"),
-        alt: &alt,
-    };
-    figure(&frame, |chart, _| {
+    let x = (Span::over(places.iter().map(|p| p.x_m * 1e3), false), "position, mm");
+    let y = (Span::over(values, false), "relative friction \u{3bc}'");
+    figure(PANEL, x, y, &alt, |chart, _| {
         band(chart, &edges[0], &edges[1], COLOURS[0])?;
         line(chart, of(|p| p.wanted), GREY, None)?;
         line(chart, of(|p| p.predicted), COLOURS[1], Some(5))?;
@@ -36,13 +32,9 @@ pub fn transfer(groups: &[Group]) -> miette::Result<String> {
     let bins = || groups.iter().flat_map(|g| &g.transfer);
     let places = Span::over(bins().map(|b| b.hz), true);
     let highest = bins().map(|b| b.gain + 2.0 * b.gain_sd).fold(1.1, f64::max).min(3.0);
-    let frame = Frame {
-        sizes: [WIDE, NARROW],
-        x: (places, "temporal frequency, Hz"),
-        y: (Span::linear(0.0..highest), "measured over wanted \u{3bc}'"),
-        alt: "Gain from wanted to measured relative friction against frequency, with the known dynamics.",
-    };
-    figure(&frame, |chart, size| {
+    let y = (Span::linear(0.0..highest), "measured over wanted \u{3bc}'");
+    let alt = "Gain from wanted to measured relative friction against frequency, with the known dynamics.";
+    figure(WIDE, (places, "temporal frequency, Hz"), y, alt, |chart, size| {
         if let Some(known) = groups.iter().find_map(|g| g.known) {
             line(chart, places.places(200).map(|hz| (hz, known.gain(hz))).collect(), GREY, None)?;
         }

@@ -2,8 +2,8 @@
 //! published of the same, and Eq. 20 with their `Psi*` at the conditions of the passes.
 
 use super::{
-    COLOURS, Frame, GREY, NARROW, PANEL, Span, band, beyond, capital, figure, line, mark, mark_name,
-    measured, mu_axis, wrong,
+    AMPLITUDE, COLOURS, GREY, PANEL, Span, band, beyond, capital, draw, figure, line, mark, mark_name,
+    measured, mu_axis, mu_on,
 };
 use crate::report::RunData;
 use crate::report::html::escape;
@@ -12,6 +12,7 @@ use crate::report::levels::{FORCE, FREQUENCY, Levels, SPEED};
 use crate::report::published::Published;
 use crate::sequence::MeasuredPass;
 use models::condition::Condition;
+use models::covariate::{self, Covariate};
 use models::psi::{PsiEq17, relative_friction, within_fitted_range};
 use models::quantity::PeakToPeak;
 use plotters::prelude::*;
@@ -19,62 +20,39 @@ use std::collections::BTreeMap;
 
 const PLACES: u32 = 120;
 
-/// An axis: what it shows of a pass and of a published value, and how a condition gets such a value.
+/// An axis: what it shows of a pass and of a published value.
 struct Axis {
     title: &'static str,
-    unit: &'static str,
-    scale: f64,
+    covariate: &'static Covariate,
     /// How far, as a share, the values of one setting lie apart.
     within: f64,
-    of: fn(&Condition) -> f64,
-    put: fn(&mut Condition, f64),
     published: fn(&Published) -> Option<f64>,
     /// The range of the paper's data, SI.
     papers: [f64; 2],
 }
 
-const AXES: [Axis; 4] = [
-    Axis {
-        title: "amplitude w, \u{b5}m peak to peak",
-        unit: "\u{b5}m",
-        scale: 1e6,
-        within: FREQUENCY,
-        of: |c| c.amplitude.metres(),
-        put: |c, v| c.amplitude = PeakToPeak::from_metres(v),
-        published: |p| p.amplitude_pp_m,
-        papers: [0.0, 5e-6],
-    },
-    Axis {
-        title: "frequency f, kHz",
-        unit: "kHz",
-        scale: 1e-3,
-        within: FREQUENCY,
-        of: |c| c.frequency_hz,
-        put: |c, v| c.frequency_hz = v,
-        published: |p| p.frequency_hz,
-        papers: [10e3, 100e3],
-    },
-    Axis {
-        title: "speed U, mm/s",
-        unit: "mm/s",
-        scale: 1e3,
-        within: SPEED,
-        of: |c| c.speed_m_s,
-        put: |c, v| c.speed_m_s = v,
-        published: |p| p.speed_m_s,
-        papers: [5e-3, 0.1],
-    },
+impl Axis {
+    const fn new(
+        title: &'static str,
+        covariate: &'static Covariate,
+        within: f64,
+        published: fn(&Published) -> Option<f64>,
+        papers: [f64; 2],
+    ) -> Self {
+        Axis { title, covariate, within, published, papers }
+    }
+
+    fn of(&self, c: &Condition) -> f64 {
+        self.covariate.of(c).unwrap_or(f64::NAN)
+    }
+}
+
+static AXES: [Axis; 4] = [
+    Axis::new(AMPLITUDE, &covariate::AMPLITUDE, FREQUENCY, |p| p.amplitude_pp_m, [0.0, 5e-6]),
+    Axis::new("frequency f, kHz", &covariate::FREQUENCY, FREQUENCY, |p| p.frequency_hz, [10e3, 100e3]),
+    Axis::new("speed U, mm/s", &covariate::SPEED, SPEED, |p| p.speed_m_s, [5e-3, 0.1]),
     // No panel: the load only says which passes belong together.
-    Axis {
-        title: "load, N",
-        unit: "N",
-        scale: 1.0,
-        within: FORCE,
-        of: |c| c.normal_force_n,
-        put: |c, v| c.normal_force_n = v,
-        published: |p| p.normal_force_n,
-        papers: [0.1, 1.0],
-    },
+    Axis::new("load, N", &covariate::NORMAL_FORCE, FORCE, |p| p.normal_force_n, [0.1, 1.0]),
 ];
 
 /// The three panels; their captions state what is not drawn.
@@ -98,16 +76,15 @@ pub fn panels(run: &RunData, all: &[Published]) -> miette::Result<String> {
 
 /// The passes that differ along one axis alone, those with most settings along it.
 fn along<'a>(driven: &[(&'a MeasuredPass, Condition)], k: usize) -> Vec<(&'a MeasuredPass, Condition)> {
-    let levels =
-        AXES.each_ref().map(|axis| Levels::of(driven.iter().map(|(_, c)| (axis.of)(c)), axis.within));
+    let levels = AXES.each_ref().map(|axis| Levels::of(driven.iter().map(|(_, c)| axis.of(c)), axis.within));
     let mut groups = BTreeMap::<Vec<usize>, Vec<(&MeasuredPass, Condition)>>::new();
     for (pass, c) in driven {
-        let others = (0..AXES.len()).filter(|i| *i != k).map(|i| levels[i].index((AXES[i].of)(c)));
+        let others = (0..AXES.len()).filter(|i| *i != k).map(|i| levels[i].index(AXES[i].of(c)));
         groups.entry(others.collect()).or_default().push((*pass, *c));
     }
     let settings = |group: &Vec<(&MeasuredPass, Condition)>| {
         let along: std::collections::BTreeSet<_> =
-            group.iter().map(|(_, c)| levels[k].index((AXES[k].of)(c))).collect();
+            group.iter().map(|(_, c)| levels[k].index(AXES[k].of(c))).collect();
         (along.len(), group.len())
     };
     groups.into_values().max_by_key(settings).unwrap_or_default()
@@ -121,19 +98,20 @@ fn panel(
     k: usize,
 ) -> miette::Result<String> {
     let axis = &AXES[k];
+    let scale = axis.covariate.shown.0;
     let chosen = along(driven, k);
     let base = chosen[chosen.len() / 2].1;
     let own: Vec<(f64, f64, f64)> = chosen
         .iter()
         .filter_map(|(p, c)| {
             let found = p.comparison?;
-            Some((axis.scale * (axis.of)(c), found.mu_relative?, found.mu_relative_sd.unwrap_or(0.0)))
+            Some((scale * axis.of(c), found.mu_relative?, found.mu_relative_sd.unwrap_or(0.0)))
         })
         .collect();
     let laws: Vec<&Published> = all.iter().filter(|p| p.psi_star.is_some() && mu0.is_some()).collect();
     let values: Vec<(&Published, f64, f64)> =
-        all.iter().filter_map(|p| Some((p, axis.scale * (axis.published)(p)?, p.mu_relative?))).collect();
-    let papers = axis.papers.map(|v| axis.scale * v).into_iter().filter(|_| !laws.is_empty());
+        all.iter().filter_map(|p| Some((p, scale * (axis.published)(p)?, p.mu_relative?))).collect();
+    let papers = axis.papers.map(|v| scale * v).into_iter().filter(|_| !laws.is_empty());
     let xs = || own.iter().map(|p| p.0).chain(values.iter().map(|v| v.1)).chain(papers.clone());
     let span = if k == 0 { Span::from_zero(xs()) } else { Span::over(xs(), true) };
     let ys = mu_axis(own.iter().map(|p| p.1).chain(values.iter().map(|v| v.2)));
@@ -150,31 +128,22 @@ fn panel(
         values.len(),
         laws.len()
     );
-    let frame = Frame {
-        sizes: [PANEL, NARROW],
-        x: (span, axis.title),
-        y: (Span::linear(ys[0]..ys[1]), "relative friction \u{3bc}'"),
-        alt: &alt,
-    };
     // Alike in every other setting that the source states.
     let alike = |p: &Published| {
         (0..AXES.len()).filter(|i| *i != k).all(|i| {
-            let own = (AXES[i].of)(&base);
+            let own = AXES[i].of(&base);
             (AXES[i].published)(p).is_none_or(|v| (v - own).abs() <= 0.1 * own)
         })
     };
     let cut = |v: f64| v.clamp(ys[0], ys[1]);
-    let svg = figure(&frame, |chart, size| {
+    let svg = figure(PANEL, (span, axis.title), mu_on(ys), &alt, |chart, size| {
         if k == 0 {
             for (i, at) in all.iter().filter(|p| p.mu_relative.is_none()).enumerate() {
                 let Some(from) = at.amplitude_pp_m.map(|w| w * 1e6) else { continue };
                 match at.amplitude_to_m {
                     Some(to) => {
-                        let area = Rectangle::new(
-                            [(from, ys[0]), (to * 1e6, ys[1])],
-                            COLOURS[if i % 2 == 0 { 5 } else { 4 }].mix(0.2).filled(),
-                        );
-                        chart.draw_series([area]).map_err(wrong)?;
+                        let fill = COLOURS[if i % 2 == 0 { 5 } else { 4 }].mix(0.2).filled();
+                        draw(chart, [Rectangle::new([(from, ys[0]), (to * 1e6, ys[1])], fill)])?;
                     }
                     None => line(chart, vec![(from, ys[0]), (from, ys[1])], GREY, Some(3))?,
                 }
@@ -185,7 +154,7 @@ fn panel(
                 .places(PLACES)
                 .filter_map(|x| {
                     let mut c = base;
-                    (axis.put)(&mut c, x / axis.scale);
+                    axis.covariate.put(&mut c, x / scale);
                     let shown = !law.of_paper || within_fitted_range(&c);
                     shown.then(|| (x, PsiEq17::at(&c, run.finger.poisson_ratio)))
                 })
@@ -205,8 +174,8 @@ fn panel(
             let colour = COLOURS[series % COLOURS.len()];
             let sd = p.mu_relative_sd.unwrap_or(0.0);
             let bar = [(*x, cut(y - sd)), (*x, cut(y + sd))];
-            chart.draw_series([PathElement::new(bar.to_vec(), colour.stroke_width(1))]).map_err(wrong)?;
-            chart.draw_series([mark(series, (*x, cut(*y)), size, colour, alike(p))]).map_err(wrong)?;
+            draw(chart, [PathElement::new(bar.to_vec(), colour.stroke_width(1))])?;
+            draw(chart, [mark(series, (*x, cut(*y)), size, colour, alike(p))])?;
         }
         Ok(())
     })?;
@@ -214,7 +183,8 @@ fn panel(
         .iter()
         .enumerate()
         .filter(|(i, _)| *i != k)
-        .map(|(_, a)| format!("{} {}", number(a.scale * (a.of)(&base)), a.unit))
+        .map(|(_, a)| (a.of(&base), a.covariate.shown))
+        .map(|(value, (scale, unit))| format!("{} {unit}", number(scale * value)))
         .collect();
     let mut words = format!("Discs: {} passes of this run at {}.", own.len(), held.join(", "));
     for (i, source) in sources.iter().enumerate() {

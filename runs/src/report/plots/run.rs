@@ -1,8 +1,8 @@
 //! The figures of a run.
 
 use super::{
-    COLOURS, Frame, GREY, NARROW, Span, WIDE, band, beyond, figure, line, mark, measured, mu_axis,
-    series_key, wrong,
+    AMPLITUDE, COLOURS, GREY, Span, WIDE, band, beyond, draw, edge_of, eq_20, figure, line, mark, measured,
+    mu_axis, mu_on, series_key, wrong,
 };
 use crate::report::RunData;
 use crate::report::html::escape;
@@ -11,7 +11,6 @@ use crate::report::levels::{FORCE, FREQUENCY, Levels, SPEED};
 use crate::sequence::MeasuredPass;
 use models::condition::Condition;
 use models::prediction::{FrictionModel, SpringSlider};
-use models::psi::{self, PsiEq17};
 use models::quantity::PeakToPeak;
 use plotters::prelude::*;
 use realtime::pacing::LoopReport;
@@ -61,13 +60,8 @@ pub fn mu_against_amplitude(run: &RunData) -> miette::Result<String> {
         chosen.len(),
         speeds.count()
     );
-    let frame = Frame {
-        sizes: [WIDE, NARROW],
-        x: (Span::linear(0.0..widest), "amplitude w, \u{b5}m peak to peak"),
-        y: (Span::linear(axis[0]..axis[1]), "relative friction \u{3bc}'"),
-        alt: &alt,
-    };
-    let svg = figure(&frame, |chart, size| {
+    let x = (Span::linear(0.0..widest), AMPLITUDE);
+    let svg = figure(WIDE, x, mu_on(axis), &alt, |chart, size| {
         for i in 0..speeds.count() {
             let colour = COLOURS[i % COLOURS.len()];
             let of_speed: Vec<&&MeasuredPass> =
@@ -80,22 +74,16 @@ pub fn mu_against_amplitude(run: &RunData) -> miette::Result<String> {
                 let grid = (1..=200).map(|k| widest * f64::from(k) / 200.0);
                 let curve: Vec<(f64, f64, f64)> =
                     grid.filter_map(|w| at(w).map(|p| (w, p.mu_relative, p.mu_relative_sd))).collect();
-                let edge = |k: f64| -> Vec<(f64, f64)> {
-                    curve.iter().map(|(w, m, s)| (*w, (m + k * s).clamp(axis[0], axis[1]))).collect()
-                };
-                band(chart, &edge(-2.0), &edge(2.0), colour)?;
-                line(chart, edge(0.0), colour, (i > 0).then_some(3 * i as i32))?;
+                band(chart, &edge_of(&curve, -2.0, axis), &edge_of(&curve, 2.0, axis), colour)?;
+                line(chart, edge_of(&curve, 0.0, axis), colour, (i > 0).then_some(3 * i as i32))?;
             }
             // Predictions of the run's own model, at the measured conditions.
             let strokes = of_speed.iter().filter_map(|p| {
                 let (w, predicted) = (value(p)?.0, p.comparison?.predicted.clamp(axis[0], axis[1]));
-                let half = 0.012 * widest;
-                Some(PathElement::new(
-                    vec![(w - half, predicted), (w + half, predicted)],
-                    BLACK.stroke_width(2),
-                ))
+                let ends = [-0.012 * widest, 0.012 * widest].map(|aside| (w + aside, predicted));
+                Some(PathElement::new(ends.to_vec(), BLACK.stroke_width(2)))
             });
-            chart.draw_series(strokes).map_err(wrong)?;
+            draw(chart, strokes)?;
             let points: Vec<_> = of_speed.iter().filter_map(|p| value(p)).collect();
             measured(chart, i, size, colour, &points, axis)?;
         }
@@ -128,17 +116,9 @@ pub fn mu_against_psi(run: &RunData) -> miette::Result<String> {
         "Relative friction against Psi from {lowest:.2} to {highest:.1}: {} passes and the curve of Eq. 20 with the run's Psi*.",
         points.len()
     );
-    let frame = Frame {
-        sizes: [WIDE, NARROW],
-        x: (Span::logarithmic(lowest..highest), "\u{3a8} of Eq. 17"),
-        y: (Span::linear(axis[0]..axis[1]), "relative friction \u{3bc}'"),
-        alt: &alt,
-    };
-    let svg = figure(&frame, |chart, size| {
-        let grid = || (0..=200).map(|k| lowest * (highest / lowest).powf(f64::from(k) / 200.0));
-        let law = |star: f64| -> Vec<(f64, f64)> {
-            grid().map(|p| (p, psi::relative_friction(PsiEq17(p), star))).collect()
-        };
+    let x = (Span::logarithmic(lowest..highest), "\u{3a8} of Eq. 17");
+    let svg = figure(WIDE, x, mu_on(axis), &alt, |chart, size| {
+        let law = |star: f64| eq_20(lowest, highest, star);
         if let Some(found) = run.psi_star() {
             band(chart, &law(found.high), &law(found.low), GREY)?;
             line(chart, law(found.psi_star), GREY, None)?;
@@ -171,13 +151,9 @@ pub fn residuals(run: &RunData) -> miette::Result<String> {
         points.len(),
         number(worst)
     );
-    let frame = Frame {
-        sizes: [(WIDE.0, 340), NARROW],
-        x: (Span::linear(0.0..end), "time, s"),
-        y: (Span::linear(-most..most), "surprise, standard deviations"),
-        alt: &alt,
-    };
-    let svg = figure(&frame, |chart, size| {
+    let (x, y) = (Span::linear(0.0..end), Span::linear(-most..most));
+    let (x, y) = ((x, "time, s"), (y, "surprise, standard deviations"));
+    let svg = figure((WIDE.0, 340), x, y, &alt, |chart, size| {
         for level in [-1.96, 1.96] {
             line(chart, vec![(0.0, level), (end, level)], GREY, Some(6))?;
         }
@@ -185,8 +161,7 @@ pub fn residuals(run: &RunData) -> miette::Result<String> {
             let colour = if *reference { GREY } else { COLOURS[1] };
             mark(usize::from(*reference), (*t, z.clamp(-most, most)), size, colour, !reference)
         });
-        chart.draw_series(marks).map_err(wrong)?;
-        Ok(())
+        draw(chart, marks)
     })?;
     let cut = beyond(points.iter().map(|p| p.1), [-most, most]);
     Ok(format!(
@@ -207,18 +182,14 @@ pub fn lateness(report: &LoopReport) -> miette::Result<String> {
     }
     let highest = bars.iter().map(|b| b.0).fold(10.0, f64::max) * 2.0;
     let most = bars.iter().map(|b| b.1).fold(10.0, f64::max) * 2.0;
-    let frame = Frame {
-        sizes: [(WIDE.0, 300), NARROW],
-        x: (Span::logarithmic(0.5..highest), "lateness, \u{b5}s"),
-        y: (Span::logarithmic(0.7..most), "deadlines"),
-        alt: "Histogram of the lateness of the loop's cycles; the figures below say the same.",
-    };
-    let svg = figure(&frame, |chart, _| {
+    let (x, y) = (Span::logarithmic(0.5..highest), Span::logarithmic(0.7..most));
+    let (x, y) = ((x, "lateness, \u{b5}s"), (y, "deadlines"));
+    let alt = "Histogram of the lateness of the loop's cycles; the figures below say the same.";
+    let svg = figure((WIDE.0, 300), x, y, alt, |chart, _| {
         let bar = |(upper, n): &(f64, f64)| {
             Rectangle::new([(upper / 2.0, 0.7), (*upper, *n)], COLOURS[0].mix(0.6).filled())
         };
-        chart.draw_series(bars.iter().map(bar)).map_err(wrong)?;
-        Ok(())
+        draw(chart, bars.iter().map(bar))
     })?;
     Ok(format!("<figure>{svg}</figure>"))
 }

@@ -1,6 +1,7 @@
 //! The figures of a verdict.
 
-use super::{COLOURS, Frame, GREY, NARROW, PANEL, Span, band, beyond, figure, line, mark, mu_axis, wrong};
+use super::{COLOURS, GREY, PANEL, Span, band, beyond, draw, edge_of, figure, line, mark, mu_axis, mu_on};
+use crate::report::html::escape;
 use models::covariate::{Covariate, Scale};
 use plotters::prelude::*;
 
@@ -34,16 +35,9 @@ pub fn overlay(
         "{title}: {} measured passes, the recalibrated baseline and the verdict's model.",
         points.len()
     );
-    let frame = Frame {
-        sizes: [PANEL, NARROW],
-        x: (span, x_name),
-        y: (Span::linear(axis[0]..axis[1]), "relative friction \u{3bc}'"),
-        alt: &alt,
-    };
     let cut = |v: f64| v.clamp(axis[0], axis[1]);
-    let svg = figure(&frame, |chart, size| {
-        let edge =
-            |k: f64| -> Vec<(f64, f64)> { corrected.iter().map(|(x, m, s)| (*x, cut(m + k * s))).collect() };
+    let svg = figure(PANEL, (span, x_name), mu_on(axis), &alt, |chart, size| {
+        let edge = |k: f64| edge_of(corrected, k, axis);
         band(chart, &edge(-2.0), &edge(2.0), COLOURS[0])?;
         line(chart, baseline.iter().map(|(x, m, _)| (*x, cut(*m))).collect(), COLOURS[1], Some(6))?;
         line(chart, edge(0.0), COLOURS[0], None)?;
@@ -51,14 +45,12 @@ pub fn overlay(
             let ends = [(p.x, cut(p.before - p.after)), (p.x, cut(p.before + p.after))];
             PathElement::new(ends.to_vec(), BLACK.stroke_width(1))
         });
-        chart.draw_series(bars).map_err(wrong)?;
-        chart
-            .draw_series(points.iter().map(|p| mark(0, (p.x, cut(p.before)), size - 1, BLACK, true)))
-            .map_err(wrong)?;
+        draw(chart, bars)?;
+        draw(chart, points.iter().map(|p| mark(0, (p.x, cut(p.before)), size - 1, BLACK, true)))?;
         rings(chart, points.iter().filter(|p| p.suspect).map(|p| (p.x, cut(p.before))), size)
     })?;
     let cut = beyond(points.iter().map(|p| p.before), axis);
-    Ok(format!("<figure>{svg}<figcaption>{}.{cut}</figcaption></figure>", crate::report::html::escape(title)))
+    Ok(format!("<figure>{svg}<figcaption>{}.{cut}</figcaption></figure>", escape(title)))
 }
 
 /// Rings around suspects.
@@ -67,8 +59,7 @@ fn rings(
     at: impl Iterator<Item = (f64, f64)>,
     size: u32,
 ) -> miette::Result<()> {
-    chart.draw_series(at.map(|p| Circle::new(p, size + 4, COLOURS[3].stroke_width(2)))).map_err(wrong)?;
-    Ok(())
+    draw(chart, at.map(|p| Circle::new(p, size + 4, COLOURS[3].stroke_width(2))))
 }
 
 /// A pass in the figure of a law.
@@ -97,22 +88,14 @@ pub fn law(
     let [low, high] = all().fold([0.0f64; 2], |[l, h], v| [l.min(v), h.max(v)]);
     let margin = 0.06 * (high - low);
     let axis = [(low - margin).max(-1.5), (high + margin).min(1.5)];
-    let frame = Frame {
-        sizes: [PANEL, NARROW],
-        x: (span, x_name),
-        y: (Span::linear(axis[0]..axis[1]), "change of \u{3bc}'"),
-        alt: &alt,
-    };
+    let y = (Span::linear(axis[0]..axis[1]), "change of \u{3bc}'");
     let cut = |v: f64| v.clamp(axis[0], axis[1]);
-    let svg = figure(&frame, |chart, size| {
-        let edge =
-            |k: f64| -> Vec<(f64, f64)> { curve.iter().map(|(x, y, sd)| (*x, cut(y + k * sd))).collect() };
+    let svg = figure(PANEL, (span, x_name), y, &alt, |chart, size| {
+        let edge = |k: f64| edge_of(curve, k, axis);
         band(chart, &edge(-2.0), &edge(2.0), COLOURS[0])?;
         let ends = [curve.first(), curve.last()].into_iter().flatten().map(|(x, ..)| (*x, 0.0));
         line(chart, ends.collect(), GREY, Some(6))?;
-        chart
-            .draw_series(passes.iter().map(|p| mark(0, (p.x, cut(p.y)), size - 1, BLACK, true)))
-            .map_err(wrong)?;
+        draw(chart, passes.iter().map(|p| mark(0, (p.x, cut(p.y)), size - 1, BLACK, true)))?;
         line(chart, alone.iter().map(|(x, y)| (*x, cut(*y))).collect(), COLOURS[1], Some(3))?;
         line(chart, edge(0.0), COLOURS[0], None)?;
         rings(chart, passes.iter().filter(|p| p.suspect).map(|p| (p.x, cut(p.y))), size)
@@ -131,19 +114,13 @@ pub fn parity(points: &[(f64, f64, f64, bool)]) -> miette::Result<String> {
         let alt =
             format!("Measured relative friction of {} passes against that of the {name}.", points.len());
         let x_name = format!("\u{3bc}' of the {name}");
-        let frame = Frame {
-            sizes: [PANEL, NARROW],
-            x: (Span::linear(bottom..top), &x_name),
-            y: (Span::linear(bottom..top), "measured \u{3bc}'"),
-            alt: &alt,
-        };
+        let span = Span::linear(bottom..top);
         let cut = |v: f64| v.clamp(bottom, top);
         let place = |p: &(f64, f64, f64, bool)| (cut(if which == 0 { p.1 } else { p.2 }), cut(p.0));
-        let svg = figure(&frame, |chart, size| {
+        let svg = figure(PANEL, (span, &x_name), (span, "measured \u{3bc}'"), &alt, |chart, size| {
             line(chart, vec![(bottom, bottom), (top, top)], GREY, None)?;
-            let marks =
-                points.iter().map(|p| mark(which, place(p), size - 1, COLOURS[1 - which], which == 1));
-            chart.draw_series(marks).map_err(wrong)?;
+            let colour = COLOURS[1 - which];
+            draw(chart, points.iter().map(|p| mark(which, place(p), size - 1, colour, which == 1)))?;
             rings(chart, points.iter().filter(|p| p.3).map(place), size)
         })?;
         Ok(format!("<figure>{svg}</figure>"))
@@ -159,20 +136,12 @@ pub fn errors_against(c: &Covariate, limit: f64, points: &[Seen]) -> miette::Res
     // A direction has no unit.
     let name = if unit.is_empty() { c.words.to_string() } else { format!("{}, {unit}", c.words) };
     let alt = format!("Errors of {} passes against {}, before and after.", points.len(), c.words);
-    let frame = Frame {
-        sizes: [PANEL, NARROW],
-        x: (Span::over(points.iter().map(|p| p.x), c.scale == Scale::Log), &name),
-        y: (Span::linear(-limit..limit), "error, sd"),
-        alt: &alt,
-    };
-    let svg = figure(&frame, |chart, size| {
+    let x = Span::over(points.iter().map(|p| p.x), c.scale == Scale::Log);
+    let y = (Span::linear(-limit..limit), "error, sd");
+    let svg = figure(PANEL, (x, &name), y, &alt, |chart, size| {
         let cut = |e: f64| e.clamp(-limit, limit);
-        chart
-            .draw_series(points.iter().map(|p| mark(1, (p.x, cut(p.before)), size - 1, COLOURS[1], false)))
-            .map_err(wrong)?;
-        chart
-            .draw_series(points.iter().map(|p| mark(0, (p.x, cut(p.after)), size - 1, COLOURS[0], true)))
-            .map_err(wrong)?;
+        draw(chart, points.iter().map(|p| mark(1, (p.x, cut(p.before)), size - 1, COLOURS[1], false)))?;
+        draw(chart, points.iter().map(|p| mark(0, (p.x, cut(p.after)), size - 1, COLOURS[0], true)))?;
         rings(chart, points.iter().filter(|p| p.suspect).map(|p| (p.x, cut(p.after))), size)
     })?;
     Ok(format!("<figure>{svg}</figure>"))
@@ -183,20 +152,15 @@ pub fn errors_against(c: &Covariate, limit: f64, points: &[Seen]) -> miette::Res
 pub fn edge(title: &str, mean: &[[f64; 4]]) -> miette::Result<String> {
     let alt = format!("{title}: the mean edge as measured, as expected in time, and with what was found.");
     let shown = |from: &[f64; 4]| (-0.02..0.2).contains(&from[0]);
-    let frame = Frame {
-        sizes: [PANEL, NARROW],
-        x: (Span::linear(-20.0..200.0), "time from the command, ms"),
-        y: (Span::linear(-0.2..1.25), "share of the change"),
-        alt: &alt,
-    };
-    let svg = figure(&frame, |chart, size| {
+    let x = (Span::linear(-20.0..200.0), "time from the command, ms");
+    let y = (Span::linear(-0.2..1.25), "share of the change");
+    let svg = figure(PANEL, x, y, &alt, |chart, size| {
         let of = |which: usize| -> Vec<(f64, f64)> {
             mean.iter().filter(|m| shown(m)).map(|m| (1e3 * m[0], m[which].clamp(-0.2, 1.25))).collect()
         };
         line(chart, of(2), COLOURS[1], Some(6))?;
         line(chart, of(3), COLOURS[0], None)?;
-        chart.draw_series(of(1).into_iter().map(|p| mark(0, p, size - 1, BLACK, true))).map_err(wrong)?;
-        Ok(())
+        draw(chart, of(1).into_iter().map(|p| mark(0, p, size - 1, BLACK, true)))
     })?;
-    Ok(format!("<figure>{svg}<figcaption>{}.</figcaption></figure>", crate::report::html::escape(title)))
+    Ok(format!("<figure>{svg}<figcaption>{}.</figcaption></figure>", escape(title)))
 }
