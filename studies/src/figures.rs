@@ -25,6 +25,12 @@ pub struct Reproduced {
     pub lines: Vec<String>,
 }
 
+impl Reproduced {
+    fn one(line: String, chart: Chart) -> Self {
+        Reproduced { charts: vec![chart], lines: vec![line] }
+    }
+}
+
 /// A study of Fig. 9.
 #[derive(Clone, Copy)]
 pub struct Study {
@@ -67,11 +73,8 @@ impl Study {
             .filter_map(|p| results.get(&content_key(&p.case, &settings())).map(|k| (*p, k.clone())))
             .collect();
         if failed > 0 || found.len() < points.len() {
-            return Err(miette!(
-                "{} of {} points of Fig. 9 are missing",
-                points.len() - found.len(),
-                points.len()
-            ));
+            let missing = points.len() - found.len();
+            return Err(miette!("{missing} of {} points of Fig. 9 are missing", points.len()));
         }
         Ok(found)
     }
@@ -90,7 +93,7 @@ const FIG_4_AMPLITUDES_M: [f64; 14] = [
 ];
 
 fn run(case: &RidgeCase) -> miette::Result<RidgeRun> {
-    ridge::run(case, &RunSettings { energy: false, ..RunSettings::default() }).into_diagnostic()
+    ridge::run(case, &settings()).into_diagnostic()
 }
 
 /// Cycle bins as (time in periods, value), over `turns` periods.
@@ -177,22 +180,21 @@ pub fn velocities(base: RidgeCase, reading: Reading) -> miette::Result<Reproduce
     let index = |target: f64| skin.iter().position(|v| *v == target).unwrap_or(0);
     let (high, low) = (index(peak(skin)), index(trough(skin)));
     let falling = ((low + n - high) % n) as f64 / n as f64;
-    Ok(Reproduced {
-        lines: vec![format!(
-            "dry, 1.35 \u{b5}m: skin {:.0} to {:.0} mm/s, plate +-{:.0} mm/s; the fall takes {:.0} % of the period, the rise {:.0} %; paper: the velocity peak is asymmetric, the unloading sloping through inertia (drawn; no number is stated)",
-            1e3 * trough(skin),
-            1e3 * peak(skin),
-            1e3 * top,
-            100.0 * falling,
-            100.0 * (1.0 - falling)
-        )],
-        charts: vec![Chart::new(
-            reading::file(reading, "fig5"),
-            "Velocity of skin and plate, dry, 1.35 \u{b5}m (Fig. 5)",
-            ["time_periods", "velocity_m_s"],
-            vec![Series::line("skin", trace(skin, 2, 1.0)), Series::line("plate", trace(&plate, 2, 1.0))],
-        )],
-    })
+    let line = format!(
+        "dry, 1.35 \u{b5}m: skin {:.0} to {:.0} mm/s, plate +-{:.0} mm/s; the fall takes {:.0} % of the period, the rise {:.0} %; paper: the velocity peak is asymmetric, the unloading sloping through inertia (drawn; no number is stated)",
+        1e3 * trough(skin),
+        1e3 * peak(skin),
+        1e3 * top,
+        100.0 * falling,
+        100.0 * (1.0 - falling)
+    );
+    let chart = Chart::new(
+        reading::file(reading, "fig5"),
+        "Velocity of skin and plate, dry, 1.35 \u{b5}m (Fig. 5)",
+        ["time_periods", "velocity_m_s"],
+        vec![Series::line("skin", trace(skin, 2, 1.0)), Series::line("plate", trace(&plate, 2, 1.0))],
+    );
+    Ok(Reproduced::one(line, chart))
 }
 
 /// Fig. 6: press, slide, vibrate.
@@ -202,21 +204,20 @@ pub fn loading(base: RidgeCase) -> miette::Result<Reproduced> {
     let (slide, full) = (2.0 * press, 2.0 * press + 2.0 * period);
     let end = full + 2.0 * period;
     let step = |from: f64| vec![(0.0, 0.0), (from, 0.0), (from, 1.0), (end, 1.0)];
-    Ok(Reproduced {
-        lines: vec![format!(
-            "press at once and settle for {press:.0} us, slide in the quasi-static slip state for {press:.0} us, then vibrate, growing over two periods; paper: this order, with waits whose lengths are not stated"
-        )],
-        charts: vec![Chart::new(
-            "fig6",
-            "Loading (Fig. 6), relative to its final value",
-            ["time_us", "share"],
-            vec![
-                Series::line("normal load", step(0.0)),
-                Series::line("lateral velocity", step(press)),
-                Series::line("vibration amplitude", vec![(0.0, 0.0), (slide, 0.0), (full, 1.0), (end, 1.0)]),
-            ],
-        )],
-    })
+    let line = format!(
+        "press at once and settle for {press:.0} us, slide in the quasi-static slip state for {press:.0} us, then vibrate, growing over two periods; paper: this order, with waits whose lengths are not stated"
+    );
+    let chart = Chart::new(
+        "fig6",
+        "Loading (Fig. 6), relative to its final value",
+        ["time_us", "share"],
+        vec![
+            Series::line("normal load", step(0.0)),
+            Series::line("lateral velocity", step(press)),
+            Series::line("vibration amplitude", vec![(0.0, 0.0), (slide, 0.0), (full, 1.0), (end, 1.0)]),
+        ],
+    );
+    Ok(Reproduced::one(line, chart))
 }
 
 /// Fig. 7: reaction force at 0.1, 1 and 2 um.
@@ -257,24 +258,23 @@ pub fn lateral_force(base: RidgeCase, reading: Reading) -> miette::Result<Reprod
     let n = normal.len();
     // From the touch-down after the longest absence to the first bin that slips.
     let sticks = (0..n).filter(|i| normal[*i] > 0.0 && lateral[*i] < 0.99 * case.mu0 * normal[*i]).count();
-    Ok(Reproduced {
-        lines: vec![format!(
-            "1.35 \u{b5}m, 20 mm/s: mu' = {:.3}; below Coulomb's limit for {:.0} % of the period, contact for {:.0} %; paper: after touch-down the ridge first deforms laterally, slips once mu_0 F_reac is reached, and the force then falls with it to zero (drawn; no number is stated)",
-            result.mu_relative,
-            100.0 * sticks as f64 / n as f64,
-            100.0 * result.contact_fraction
-        )],
-        charts: vec![Chart::new(
-            reading::file(reading, "fig8"),
-            "Forces in one period, 1.35 \u{b5}m (Fig. 8)",
-            ["time_periods", "force_n"],
-            vec![
-                Series::line("F_reac", trace(normal, 1, scale)),
-                Series::line("mu_0 F_reac", trace(normal, 1, scale * case.mu0)),
-                Series::line("lateral force", trace(lateral, 1, scale)),
-            ],
-        )],
-    })
+    let line = format!(
+        "1.35 \u{b5}m, 20 mm/s: mu' = {:.3}; below Coulomb's limit for {:.0} % of the period, contact for {:.0} %; paper: after touch-down the ridge first deforms laterally, slips once mu_0 F_reac is reached, and the force then falls with it to zero (drawn; no number is stated)",
+        result.mu_relative,
+        100.0 * sticks as f64 / n as f64,
+        100.0 * result.contact_fraction
+    );
+    let chart = Chart::new(
+        reading::file(reading, "fig8"),
+        "Forces in one period, 1.35 \u{b5}m (Fig. 8)",
+        ["time_periods", "force_n"],
+        vec![
+            Series::line("F_reac", trace(normal, 1, scale)),
+            Series::line("mu_0 F_reac", trace(normal, 1, scale * case.mu0)),
+            Series::line("lateral force", trace(lateral, 1, scale)),
+        ],
+    );
+    Ok(Reproduced::one(line, chart))
 }
 
 /// Fig. 9: the five panels.

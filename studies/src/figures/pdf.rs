@@ -10,6 +10,9 @@ use plotters_backend::{
 };
 use std::convert::Infallible;
 
+/// What a stroke comes to: nothing can go wrong.
+type Drawn = Result<(), DrawingErrorKind<Infallible>>;
+
 /// Advance widths of Helvetica from the blank to the tilde, in thousandths of the letters' size (Adobe's metrics of its core fonts).
 const WIDTHS: [u16; 95] = [
     278, 278, 355, 556, 556, 889, 667, 191, 333, 333, 389, 584, 278, 333, 278, 278, 556, 556, 556, 556, 556,
@@ -90,11 +93,11 @@ impl DrawingBackend for PdfBackend<'_> {
         self.size
     }
 
-    fn ensure_prepared(&mut self) -> Result<(), DrawingErrorKind<Infallible>> {
+    fn ensure_prepared(&mut self) -> Drawn {
         Ok(())
     }
 
-    fn present(&mut self) -> Result<(), DrawingErrorKind<Infallible>> {
+    fn present(&mut self) -> Drawn {
         let [catalogue, pages, page, content, helvetica, symbol] = [1, 2, 3, 4, 5, 6].map(Ref::new);
         let mut pdf = Pdf::new();
         pdf.catalog(catalogue).pages(pages);
@@ -112,20 +115,11 @@ impl DrawingBackend for PdfBackend<'_> {
         Ok(())
     }
 
-    fn draw_pixel(
-        &mut self,
-        place: BackendCoord,
-        colour: BackendColor,
-    ) -> Result<(), DrawingErrorKind<Infallible>> {
+    fn draw_pixel(&mut self, place: BackendCoord, colour: BackendColor) -> Drawn {
         self.draw_rect(place, (place.0 + 1, place.1 + 1), &colour, true)
     }
 
-    fn draw_line<S: BackendStyle>(
-        &mut self,
-        from: BackendCoord,
-        to: BackendCoord,
-        style: &S,
-    ) -> Result<(), DrawingErrorKind<Infallible>> {
+    fn draw_line<S: BackendStyle>(&mut self, from: BackendCoord, to: BackendCoord, style: &S) -> Drawn {
         self.draw_path([from, to], style)
     }
 
@@ -135,7 +129,7 @@ impl DrawingBackend for PdfBackend<'_> {
         to: BackendCoord,
         style: &S,
         fill: bool,
-    ) -> Result<(), DrawingErrorKind<Infallible>> {
+    ) -> Drawn {
         let corners = [from, (to.0, from.1), to, (from.0, to.1), from];
         if fill { self.fill_polygon(corners, style) } else { self.draw_path(corners, style) }
     }
@@ -144,7 +138,7 @@ impl DrawingBackend for PdfBackend<'_> {
         &mut self,
         path: I,
         style: &S,
-    ) -> Result<(), DrawingErrorKind<Infallible>> {
+    ) -> Drawn {
         if style.color().alpha > 0.0 {
             self.stroke_as(style);
             self.path(path);
@@ -159,7 +153,7 @@ impl DrawingBackend for PdfBackend<'_> {
         radius: u32,
         style: &S,
         fill: bool,
-    ) -> Result<(), DrawingErrorKind<Infallible>> {
+    ) -> Drawn {
         let (x, y) = self.at(centre);
         let r = radius as f32 / PER_POINT as f32;
         // Four cubic arcs: 0.5523 of the radius is the usual distance of their control points.
@@ -186,7 +180,7 @@ impl DrawingBackend for PdfBackend<'_> {
         &mut self,
         corners: I,
         style: &S,
-    ) -> Result<(), DrawingErrorKind<Infallible>> {
+    ) -> Drawn {
         if style.color().alpha > 0.0 {
             self.fill_as(style);
             self.path(corners);
@@ -196,12 +190,7 @@ impl DrawingBackend for PdfBackend<'_> {
         Ok(())
     }
 
-    fn draw_text<T: BackendTextStyle>(
-        &mut self,
-        text: &str,
-        style: &T,
-        place: BackendCoord,
-    ) -> Result<(), DrawingErrorKind<Infallible>> {
+    fn draw_text<T: BackendTextStyle>(&mut self, text: &str, style: &T, place: BackendCoord) -> Drawn {
         let [r, g, b] = on_white(style.color());
         let size = style.size() as f32 / PER_POINT as f32;
         let width = width_of(text, f64::from(size)) as f32;

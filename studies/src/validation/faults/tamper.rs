@@ -127,28 +127,16 @@ impl<P: Amplifier> Amplifier for Tampered<P> {
         let mut state = self.inner.state(now)?;
         let Some((tamper, _)) = self.acting(now) else { return Ok(state) };
         match tamper {
-            Tamper::AmplitudeTimes(factor) => {
-                if let Ok(amplitude) = &mut state.amplitude {
-                    amplitude.value *= factor;
-                }
-            }
+            Tamper::AmplitudeTimes(factor) => state.amplitude.iter_mut().for_each(|a| a.value *= factor),
             Tamper::AmplitudeStuck => {
                 if let Ok(amplitude) = &mut state.amplitude {
                     let held = *self.held.get_or_insert(*amplitude);
                     (amplitude.value, amplitude.raw) = (held.value, held.raw);
                 }
             }
-            Tamper::AmplitudeRails => {
-                if let Ok(amplitude) = &mut state.amplitude {
-                    amplitude.quality = Quality::Saturated;
-                }
-            }
+            Tamper::AmplitudeRails => state.amplitude.iter_mut().for_each(|a| a.quality = Quality::Saturated),
             Tamper::AmplitudeLost => state.amplitude = Err(NoData::Invalid),
-            Tamper::Hot => {
-                if let Ok(temperature) = &mut state.temperature_c {
-                    temperature.value = 80.0;
-                }
-            }
+            Tamper::Hot => state.temperature_c.iter_mut().for_each(|t| t.value = 80.0),
             Tamper::TemperatureLost => state.temperature_c = Err(NoData::Invalid),
             Tamper::AmplifierFault => state.fault = true,
             Tamper::WatchdogFired => state.watchdog_tripped = true,
