@@ -74,12 +74,8 @@ pub fn amplitude_for(
         Ok(None)
     };
     let Some(w) = crossing(mu_relative)? else {
-        let reached = at(largest.metres())?.mu_relative;
-        return Err(NoAmplitude::OutOfReach {
-            wanted: mu_relative,
-            largest_um: largest.metres() * 1e6,
-            reached,
-        });
+        let (reached, largest_um) = (at(largest.metres())?.mu_relative, largest.metres() * 1e6);
+        return Err(NoAmplitude::OutOfReach { wanted: mu_relative, largest_um, reached });
     };
     let prediction = at(w)?;
     let sd = prediction.mu_relative_sd;

@@ -224,13 +224,8 @@ impl Corrected {
                     .value;
                 let slack = 1e-9 * (p.upper - p.lower).abs().min(1.0);
                 if !(value >= p.lower - slack && value <= p.upper + slack) {
-                    return Err(ModelError::Range {
-                        effect: s.name.clone(),
-                        name: p.name,
-                        value,
-                        lower: p.lower,
-                        upper: p.upper,
-                    });
+                    let (effect, name, lower, upper) = (s.name.clone(), p.name, p.lower, p.upper);
+                    return Err(ModelError::Range { effect, name, value, lower, upper });
                 }
                 theta.push(value);
             }

@@ -85,15 +85,8 @@ impl Parameter {
     }
     /// A positive shape parameter with a lognormal prior, bounded at three deviations.
     pub const fn shape(name: &'static str, unit: &'static str, median: f64, sd_ln: f64) -> Self {
-        Self {
-            name,
-            unit,
-            zero: None,
-            prior: Prior::LogNormal(median, sd_ln),
-            lower: 0.0,
-            upper: f64::INFINITY,
-            bends: false,
-        }
+        let prior = Prior::LogNormal(median, sd_ln);
+        Self { name, unit, zero: None, prior, lower: 0.0, upper: f64::INFINITY, bends: false }
     }
     /// The same as a shape that only bends the law about its middle: see [`Parameter::bends`].
     pub const fn bending(self) -> Self {
