@@ -279,7 +279,7 @@ fn complete(setup: &Setup) -> miette::Result<()> {
     let mut wrong = Problems::of(&setup.origin, &setup.text);
     if let Err(problem) = setup.has_both_axes() {
         let remedy = "give each of the axes `lateral` and `normal` one signal of one instrument";
-        wrong.add(&["force"], problem, remedy.to_string());
+        wrong.add(&["force"], problem.to_string(), remedy.to_string());
     }
     let limits = &setup.config.limits;
     let amplifier = setup.file.amplifier.description().map_err(|e| miette::miette!("{e}"))?;

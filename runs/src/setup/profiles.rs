@@ -240,12 +240,13 @@ impl Setup {
     ///
     /// # Errors
     /// What is missing, or given twice.
-    pub fn has_both_axes(&self) -> Result<(), String> {
-        let port = |instrument: &InstrumentSetup| {
-            let profile = instrument.description().map_err(|error| error.to_string())?;
-            Endpoint::force(profile, instrument).map(|(_, port)| port)
-        };
-        compose(self.file.force.iter().map(port).collect::<Result<_, _>>()?).map(drop)
+    pub fn has_both_axes(&self) -> Result<(), Box<dyn std::error::Error>> {
+        let mut ports = Vec::new();
+        for instrument in &self.file.force {
+            ports.push(Endpoint::force(instrument.description()?, instrument)?.1);
+        }
+        compose(ports)?;
+        Ok(())
     }
 
     /// The profiles of its instruments, and the files that they name, by file name: for the record.
