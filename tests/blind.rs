@@ -67,7 +67,7 @@ fn a_withheld_cause_is_no_other_cause() {
         .par_iter()
         .step_by(tests::rounds(7, 1))
         .filter_map(|&(name, seed)| {
-            let imitated = sim::defects::Kind::named(name).is_some_and(|kind| kind.imitated);
+            let imitated = sim::defects::DefectKind::named(name).is_some_and(|kind| kind.imitated);
             let stratum = if imitated { Stratum::Alias } else { Stratum::Single };
             let set = generate(seed, stratum, Ask::Gain);
             assert_eq!(set.label.causes[0].name, name, "the set of seed {seed} has another cause by now");
@@ -95,7 +95,7 @@ fn no_sealed_form_is_the_librarys_own() {
         .par_iter()
         .step_by(tests::rounds(2, 1))
         .map(|&(name, seed)| {
-            let imitated = sim::defects::Kind::named(name).is_some_and(|kind| kind.imitated);
+            let imitated = sim::defects::DefectKind::named(name).is_some_and(|kind| kind.imitated);
             let stratum = if imitated { Stratum::Alias } else { Stratum::Single };
             let set = generate(seed, stratum, Ask::Gain);
             (name, distance(&set).expect("a set of one cause of the library"))

@@ -67,7 +67,9 @@ impl Made {
 
 /// A certificate of today, as `calibrate` would write it.
 fn certificate() -> String {
-    use calibration::certificate::{Instrument, Kind, Occasion, Outcome, Parameter, RawData, Residuals};
+    use calibration::certificate::{
+        CertificateKind, Instrument, Occasion, Outcome, Parameter, RawData, Residuals,
+    };
     let now = tests::waiting::now_unix_s() as u64;
     let parameter = Parameter {
         name: "delay".into(),
@@ -78,7 +80,7 @@ fn certificate() -> String {
         ci95: [0.98e-3, 1.02e-3],
     };
     let outcome = Outcome {
-        kind: Kind::Latency,
+        kind: CertificateKind::Latency,
         model: "a delay".into(),
         settings: Default::default(),
         remarks: Vec::new(),

@@ -6,13 +6,13 @@ use diagnosis::hypotheses::Options;
 use diagnosis::verdict::{Report, diagnose};
 use models::pass::Pass;
 use rayon::prelude::*;
-use sim::defects::Kind;
+use sim::defects::DefectKind;
 use sim::sealed::rough::{RoughSet, Roughness, rough};
 
 const CAUSES: [&str; 4] = ["squeeze_film", "load_dependent_friction", "lateral_offset_drift", "adhesion"];
 
 fn set(seed: u64, cause: &str) -> RoughSet {
-    rough(seed, Some(Kind::named(cause).unwrap()), Roughness::Gaussian)
+    rough(seed, Some(DefectKind::named(cause).unwrap()), Roughness::Gaussian)
 }
 
 fn report(passes: &[Pass], rig: &RigFile) -> Report {

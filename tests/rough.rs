@@ -4,7 +4,7 @@ use diagnosis::Verdict;
 use diagnosis::hypotheses::Options;
 use diagnosis::verdict::Report;
 use rayon::prelude::*;
-use sim::defects::Kind;
+use sim::defects::DefectKind;
 use sim::sealed::rough::{RoughSet, Roughness, rough};
 use studies::validation::blind::rough::{answer, run};
 use tests::rounds;
@@ -51,7 +51,7 @@ fn scatter_hides_no_cause() {
 /// with it: in two tables of three, for one within the form uncertainty of a large cause does not stand out.
 #[test]
 fn one_bad_pass_is_named_and_leaves_the_verdict_as_it_was() {
-    let film = Kind::named("squeeze_film");
+    let film = DefectKind::named("squeeze_film");
     let one = |k: u64| {
         let seed = 4_700_000 + k;
         let bad = rough(seed, film, Roughness::Gross(1.0 / 176.0));
@@ -74,7 +74,7 @@ fn one_bad_pass_is_named_and_leaves_the_verdict_as_it_was() {
 #[test]
 fn the_verdict_is_smooth_in_the_share_of_bad_passes() {
     let shares = rounds(&[0.0, 0.05, 0.1][..], &[0.0, 0.025, 0.05, 0.075, 0.1]);
-    for truth in [None, Kind::named("load_dependent_friction")] {
+    for truth in [None, DefectKind::named("load_dependent_friction")] {
         let curve: Vec<(Verdict, f64)> = shares
             .par_iter()
             .map(|&share| {

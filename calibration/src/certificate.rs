@@ -8,7 +8,7 @@
 pub mod date;
 mod verify;
 
-pub use models::rig_file::CertificateKind as Kind;
+pub use models::rig_file::CertificateKind;
 pub use verify::{Circumstances, Refusal, Verified};
 
 use nalgebra::{DMatrix, DVector};
@@ -157,7 +157,7 @@ pub struct Certificate {
     /// [`SCHEMA`].
     pub schema: String,
     /// What was calibrated.
-    pub kind: Kind,
+    pub kind: CertificateKind,
     /// When, RFC 3339 in UTC.
     pub date: String,
     /// By whom.
@@ -222,7 +222,7 @@ impl Occasion {
 #[derive(Clone, Debug, PartialEq)]
 pub struct Outcome {
     /// What was calibrated.
-    pub kind: Kind,
+    pub kind: CertificateKind,
     /// The model in words and symbols.
     pub model: String,
     /// Choices that its use depends on.

@@ -7,7 +7,7 @@ pub mod friction;
 pub mod springs;
 pub mod stiffness;
 
-use crate::certificate::{BudgetLine, Finding, Kind, Outcome, Residuals, parameters};
+use crate::certificate::{BudgetLine, CertificateKind, Finding, Outcome, Residuals, parameters};
 use crate::identify::Identified;
 use crate::identify::skin::{IdentifiedSkin, Profile};
 use crate::regression::FitError;
@@ -95,7 +95,7 @@ impl FingerFit {
             }
         }
         Outcome {
-            kind: Kind::Finger,
+            kind: CertificateKind::Finger,
             model: "F = F0 + k (x - x0) + loop; F1 = (k' + i k'') a in full contact; \
                     ln mu0 = ln m + (n - 1) ln(F/F0) + s ln(U/U0) + ln(1 + g (1 - exp(-t/tau)))"
                 .into(),

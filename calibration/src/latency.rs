@@ -5,7 +5,7 @@
 
 pub mod clock;
 
-use crate::certificate::{BudgetLine, Finding, Kind, Outcome, Residuals, parameters};
+use crate::certificate::{BudgetLine, CertificateKind, Finding, Outcome, Residuals, parameters};
 use crate::uncertainty::Input;
 use statrs::distribution::{ChiSquared, ContinuousCDF};
 use std::collections::BTreeMap;
@@ -101,7 +101,7 @@ pub fn outcome(channels: &[ChannelDelay], clocks: &[(String, clock::ClockFit)]) 
     let jitter = channels.iter().map(|c| c.jitter_s).fold(0.0, f64::max);
     let largest = channels.iter().map(|c| (c.range_s[1] - c.delay.value).max(c.delay.value - c.range_s[0]));
     Outcome {
-        kind: Kind::Latency,
+        kind: CertificateKind::Latency,
         model: "t_channel = t_event + delay + jitter; t_device = (1 + clock_rate_error) t_host + constant"
             .into(),
         settings: BTreeMap::new(),

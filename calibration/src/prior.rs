@@ -2,7 +2,7 @@
 //! instrument only within what its certificate leaves.
 
 use crate::amplitude::apply::AmplitudeCalibration;
-use crate::certificate::{Kind, Refusal, Verified};
+use crate::certificate::{CertificateKind, Refusal, Verified};
 use crate::force::apply::ForceCalibration;
 use crate::force::zero::Zero;
 use models::rig_file::Calibration;
@@ -14,7 +14,7 @@ use models::rig_file::Calibration;
 pub fn take(known: &mut Calibration, verified: Verified) -> Result<(), Refusal> {
     let certificate = verified.certificate();
     match certificate.kind {
-        Kind::Force => {
+        CertificateKind::Force => {
             let force = ForceCalibration::compile(verified, None)?;
             let priors = force.priors();
             known.lateral_gain_sd = Some(priors.lateral_gain_sd);
@@ -28,10 +28,13 @@ pub fn take(known: &mut Calibration, verified: Verified) -> Result<(), Refusal> 
                 (known.lateral_offset_sd_n, known.normal_offset_sd_n) = (Some(lateral), Some(normal));
             }
         }
-        Kind::Amplitude => {
+        CertificateKind::Amplitude => {
             known.amplitude_gain_sd = Some(AmplitudeCalibration::compile(verified)?.gain_relative_sd());
         }
-        Kind::Latency | Kind::Phase | Kind::Finger | Kind::Sensor => {}
+        CertificateKind::Latency
+        | CertificateKind::Phase
+        | CertificateKind::Finger
+        | CertificateKind::Sensor => {}
     }
     Ok(())
 }

@@ -3,7 +3,7 @@
 
 use crate::decision::{Decision, Verdict};
 use crate::fitted::Fitted;
-use crate::structure::shapes::{Kind, Shape};
+use crate::structure::shapes::{Shape, ShapeKind};
 use serde::Serialize;
 use std::f64::consts::LN_10;
 
@@ -15,7 +15,7 @@ const LEAST_ODDS: f64 = 1.0;
 #[derive(Debug, Clone, PartialEq, Serialize, schemars::JsonSchema)]
 pub struct Description {
     /// What it is.
-    pub structure: Kind,
+    pub structure: ShapeKind,
     /// The covariate over which it is.
     pub covariate: &'static str,
     /// Place of a jump or bump, length of a period, in the covariate's unit.
@@ -57,9 +57,9 @@ fn words(shape: &Shape) -> String {
     let [low, high] = shape.at.1.map(value);
     let (at, over) = (value(shape.at.0), shape.covariate.words);
     let place = match shape.kind {
-        Kind::Jump => format!("a jump over {over} at {at} {unit}"),
-        Kind::Bump => format!("a bump over {over} about {at} {unit}"),
-        Kind::Period => format!("a period of {at} {unit} over {over}"),
+        ShapeKind::Jump => format!("a jump over {over} at {at} {unit}"),
+        ShapeKind::Bump => format!("a bump over {over} about {at} {unit}"),
+        ShapeKind::Period => format!("a period of {at} {unit} over {over}"),
     };
     let of = if shape.turns { "friction" } else { "the lateral reading, alike in both directions" };
     format!("{place} (95 %: {low} to {high}) in {of}, {:+.3} of full friction", shape.size.0)

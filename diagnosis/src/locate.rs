@@ -5,7 +5,7 @@ mod partition;
 use crate::data::RigFile;
 use crate::fitted::Fitted;
 use crate::predict::{Forecast, Model, forecast};
-use effects::Place;
+use effects::Location;
 use models::condition::Condition;
 use models::covariate;
 use models::quantity::PeakToPeak;
@@ -29,7 +29,8 @@ pub struct Region {
 
 /// Probability by place; `unknown` is the open set's.
 pub fn ledger(fitted: &Fitted, probabilities: &[f64], unknown: f64) -> BTreeMap<&'static str, f64> {
-    let mut map: BTreeMap<&'static str, f64> = Place::ALL.iter().map(|place| (place.name(), 0.0)).collect();
+    let mut map: BTreeMap<&'static str, f64> =
+        Location::ALL.iter().map(|place| (place.name(), 0.0)).collect();
     map.insert("unknown", unknown);
     for (c, p) in fitted.candidates.iter().zip(probabilities) {
         for &e in &c.effects {

@@ -1,6 +1,6 @@
 //! One cause in one of its laws: a part of a hypothesis. docs/diagnosis/model.md, section 4.
 
-use effects::{Design, Law, Parameter, Place};
+use effects::{Design, Law, Location, Parameter};
 
 /// One member of a hypothesis: number of the effect, and index of its law.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash, PartialOrd, Ord)]
@@ -33,7 +33,7 @@ impl Member {
         effects::at(self.effect).departs_by
     }
     /// Where the effect sits.
-    pub fn place(&self) -> Place {
+    pub fn place(&self) -> Location {
         effects::at(self.effect).place
     }
 }

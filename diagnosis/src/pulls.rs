@@ -8,7 +8,7 @@
 
 use crate::evidence::Posterior;
 use crate::fit::{Member, Problem};
-use effects::{Law, Place, library};
+use effects::{Law, Location, library};
 use serde::Serialize;
 
 /// Pull of one stiffness from its prior.
@@ -72,7 +72,7 @@ const STIFFNESSES: [&str; 2] = ["normal_stiffness", "lateral_stiffness"];
 /// Errors of plate and instruments that do as a change of this parameter of the baseline does, by name.
 fn imitators(parameter: usize) -> Vec<&'static str> {
     let acts = |law: &&Law| law.acts_as.is_some_and(|e_folds| e_folds[parameter] != 0.0);
-    let outside_finger = library().iter().filter(|e| e.place != Place::Finger);
+    let outside_finger = library().iter().filter(|e| e.place != Location::Finger);
     let mut names: Vec<&str> =
         outside_finger.filter(|e| e.laws.iter().any(|l| acts(&l))).map(|e| e.name).collect();
     names.sort_unstable();
@@ -114,7 +114,7 @@ pub fn pulls(problem: &Problem, none: &Posterior, model: &Posterior) -> Vec<Pull
 
 /// Whether a member is an error of the finger's calibration: a change of the baseline itself.
 fn errs_in_the_finger(member: &Member) -> bool {
-    member.place() == Place::Finger && member.form().acts_as.is_some()
+    member.place() == Location::Finger && member.form().acts_as.is_some()
 }
 
 /// Factors on normal and lateral stiffness that a named error of a stiffness adds to the baseline's.

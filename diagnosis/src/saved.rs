@@ -5,7 +5,7 @@ use crate::evidence::Posterior;
 use crate::fit::{Member, Problem};
 use crate::layout::Layout;
 use crate::verdict::Diagnosis;
-use effects::Place;
+use effects::Location;
 use effects::corrected::{SavedEffect, SavedModel, SavedParameter};
 
 /// Least relative uncertainty that a model states.
@@ -66,7 +66,7 @@ fn saved_effect(
         .collect();
     let entry = |i: usize, j: usize| best.covariance[(first + i, first + j)] * slope[i] * slope[j];
     let all = 0..own.len();
-    let acts_on = if member.place() == Place::Instrument { "reading" } else { "prediction" };
+    let acts_on = if member.place() == Location::Instrument { "reading" } else { "prediction" };
     SavedEffect {
         name: member.name().to_string(),
         law: member.form().name.to_string(),

@@ -19,7 +19,7 @@ use models::quantity::PeakToPeak;
 pub use orders::Due;
 use orders::Orders;
 use realtime::ports::{
-    AmplifierState, Contact, Contacts, Forces, Nanos, NoData, Reading, StageState, SupplyState,
+    AmplifierState, Contact, Contacts, Forces, Nanos, NoData, Sample, StageState, SupplyState,
 };
 use ringbuf::HeapProd;
 use ringbuf::traits::Producer;
@@ -402,7 +402,7 @@ impl Endpoint {
                     if let Some(axis) =
                         axis.as_ref().filter(|axis| view.profile.frame_of(axis.signal) == frame)
                     {
-                        *force = view.channel(axis.signal).map(|reading| Reading {
+                        *force = view.channel(axis.signal).map(|reading| Sample {
                             value: axis.gain * reading.value - axis.offset_n,
                             ..reading
                         });

@@ -1,7 +1,7 @@
 //! From forces to friction: `mu`, `mu'` with uncertainty and age in every cycle, and means over a pass.
 #![deny(clippy::disallowed_types, clippy::disallowed_methods)]
 
-use crate::ports::{Nanos, Reading};
+use crate::ports::{Nanos, Sample};
 use models::quantity::Direction;
 use serde::{Deserialize, Serialize};
 
@@ -91,7 +91,7 @@ impl Window {
     }
 
     /// Takes a pair of samples, unless the lateral one was seen before.
-    pub fn push(&mut self, config: &EstimateConfig, lateral: &Reading, normal: &Reading) {
+    pub fn push(&mut self, config: &EstimateConfig, lateral: &Sample, normal: &Sample) {
         if self.lateral_sequence == Some(lateral.sequence) {
             return;
         }

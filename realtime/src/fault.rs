@@ -7,7 +7,7 @@
 #![deny(clippy::disallowed_types, clippy::disallowed_methods)]
 
 use crate::ports::{
-    Amplifier, AmplifierState, Channel, ForceSensor, Forces, Nanos, NoData, Quality, Reading, Stage,
+    Amplifier, AmplifierState, Channel, ForceSensor, Forces, Nanos, NoData, Quality, Sample, Stage,
     StageState,
 };
 use crate::safety::{DriveCommand, StageCommand};
@@ -138,7 +138,7 @@ impl Dice {
 }
 
 /// A value that travels through a faulty line: its count, and what a fault can do to it.
-trait Sample: Copy {
+trait Sampled: Copy {
     fn sequence(&self) -> u32;
     fn hold(&mut self, earlier: &Self);
     fn spoil(&mut self, dice: &mut Dice);
@@ -160,7 +160,7 @@ fn garbage(dice: &mut Dice) -> f64 {
     }
 }
 
-impl Sample for Reading {
+impl Sampled for Sample {
     fn sequence(&self) -> u32 {
         self.sequence
     }
@@ -184,7 +184,7 @@ impl Sample for Reading {
     }
 }
 
-impl Sample for AmplifierState {
+impl Sampled for AmplifierState {
     fn sequence(&self) -> u32 {
         self.sequence
     }
@@ -206,14 +206,14 @@ impl Sample for AmplifierState {
         self.amplitude.iter_mut().for_each(|a| a.scale(factor));
     }
     fn saturate(&mut self) {
-        self.amplitude.iter_mut().for_each(Sample::saturate);
+        self.amplitude.iter_mut().for_each(Sampled::saturate);
     }
     fn move_clock(&mut self, seconds: f64) {
         self.taken_at = moved(self.taken_at, seconds);
     }
 }
 
-impl Sample for StageState {
+impl Sampled for StageState {
     fn sequence(&self) -> u32 {
         self.sequence
     }
@@ -237,7 +237,7 @@ impl Sample for StageState {
 
 /// One line from an instrument, with what is wrong with it.
 #[derive(Clone, Copy)]
-struct Line<S: Sample> {
+struct Line<S: Sampled> {
     faults: [Option<Fault>; FAULTS],
     dice: Dice,
     /// The last samples as they came, with their arrival; a ring.
@@ -253,7 +253,7 @@ struct Line<S: Sample> {
     struck: [Option<Result<S, NoData>>; FAULTS],
 }
 
-impl<S: Sample> Line<S> {
+impl<S: Sampled> Line<S> {
     fn new(target: [Target; 2], faults: &[Fault], seed: u64) -> Self {
         let mut mine_only = [None; FAULTS];
         let mine = faults.iter().filter(|f| target.contains(&f.target));
@@ -360,7 +360,7 @@ impl<S: Sample> Line<S> {
                 self.spiked = true;
                 out.iter_mut().for_each(|sample| sample.scale(100.0));
             }
-            FaultMode::Saturated => out.iter_mut().for_each(Sample::saturate),
+            FaultMode::Saturated => out.iter_mut().for_each(Sampled::saturate),
             FaultMode::Disordered => {
                 if !fresh || self.count.is_multiple_of(2) {
                     return false;
@@ -376,8 +376,8 @@ impl<S: Sample> Line<S> {
 /// A force sensor with faults.
 pub struct FaultyForce<P> {
     inner: P,
-    lateral: Line<Reading>,
-    normal: Line<Reading>,
+    lateral: Line<Sample>,
+    normal: Line<Sample>,
 }
 
 impl<P: ForceSensor> FaultyForce<P> {
@@ -392,7 +392,7 @@ impl<P: ForceSensor> FaultyForce<P> {
 impl<P: ForceSensor> ForceSensor for FaultyForce<P> {
     fn read(&mut self, now: Nanos) -> Forces {
         let came = self.inner.read(now);
-        let pass = |line: &mut Line<Reading>, channel: Channel| line.pass(channel, now);
+        let pass = |line: &mut Line<Sample>, channel: Channel| line.pass(channel, now);
         Forces { lateral: pass(&mut self.lateral, came.lateral), normal: pass(&mut self.normal, came.normal) }
     }
 }

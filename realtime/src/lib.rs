@@ -2,7 +2,7 @@
 //!
 //! | module | purpose |
 //! |---|---|
-//! | [`ports`], `signals` | the seams `ForceSensor`, `Amplifier`, `Stage`, `SupplySwitch`, `SafetyInputs`; `Reading`, and `NoData` with its reason |
+//! | [`ports`], `signals` | the seams `ForceSensor`, `Amplifier`, `Stage`, `SupplySwitch`, `SafetyInputs`; `Sample`, and `NoData` with its reason |
 //! | [`cycle`] | pure `step`: commands, safety, estimate, comparison |
 //! | [`safety`] | limits, the state machine, the only maker of a [`safety::DriveCommand`] |
 //! | [`estimate`] | `mu`, `mu'` with uncertainty and age; means over a pass |

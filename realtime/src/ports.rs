@@ -5,7 +5,7 @@
 
 use crate::safety::{DriveCommand, StageCommand};
 pub use crate::signals::{
-    AmplifierState, Channel, Contact, Contacts, Forces, Nanos, NoData, Quality, Reading, StageState,
+    AmplifierState, Channel, Contact, Contacts, Forces, Nanos, NoData, Quality, Sample, StageState,
     SupplyCommand, SupplyState,
 };
 

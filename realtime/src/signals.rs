@@ -45,7 +45,7 @@ pub enum Quality {
 
 /// One sample of one channel, with what is needed to trust it.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
-pub struct Reading {
+pub struct Sample {
     /// Calibrated value in SI units.
     #[serde(with = "crate::number")]
     pub value: f64,
@@ -59,7 +59,7 @@ pub struct Reading {
     pub quality: Quality,
 }
 
-impl Reading {
+impl Sample {
     /// Age of the sample at `now`.
     pub const fn age(&self, now: Nanos) -> Nanos {
         now.since(self.taken_at)
@@ -88,7 +88,7 @@ pub enum NoData {
 }
 
 /// A channel's latest reading, or why there is none.
-pub type Channel = Result<Reading, NoData>;
+pub type Channel = Result<Sample, NoData>;
 
 /// What a force sensor delivers. The two axes may come from two instruments: each has its own time and sequence.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]

@@ -9,7 +9,7 @@ use models::finger::Finger;
 use models::prediction::{EmpiricalPsi, FrictionModel, SpringSlider};
 use realtime::cycle::{self, Command, CycleState, Inputs, Marker, Phase};
 use realtime::estimate::Mu0;
-use realtime::ports::{AmplifierState, Contacts, Forces, Nanos, NoData, Quality, Reading, StageState};
+use realtime::ports::{AmplifierState, Contacts, Forces, Nanos, NoData, Quality, Sample, StageState};
 use realtime::safety::{Observation, Request};
 use runs::plan::Plan;
 use runs::session::rehearse;
@@ -56,7 +56,7 @@ fn step(bencher: Bencher<'_, '_>) {
         let now = Nanos(u64::from(n) * 1_000_000);
         let reading = |value: f64| {
             let raw = i64::from(n % 7);
-            Ok(Reading { value, raw, taken_at: now, sequence: n, quality: Quality::Good })
+            Ok(Sample { value, raw, taken_at: now, sequence: n, quality: Quality::Good })
         };
         let request = Request {
             amplitude: Condition::paper().amplitude,

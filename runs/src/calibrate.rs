@@ -16,7 +16,7 @@ mod phase;
 mod tables;
 
 use crate::setup::Setup;
-use calibration::certificate::{Certificate, Instrument, Kind, Occasion, Outcome, RawData, date};
+use calibration::certificate::{Certificate, CertificateKind, Instrument, Occasion, Outcome, RawData, date};
 use drivers::vibrometer::Settings;
 use miette::IntoDiagnostic;
 use models::quantity::PeakToPeak;
@@ -252,7 +252,7 @@ impl Issued {
 ///
 /// # Errors
 /// What is wrong with it.
-pub fn check(name: &str, text: &str) -> miette::Result<Kind> {
+pub fn check(name: &str, text: &str) -> miette::Result<CertificateKind> {
     let certificate = Certificate::from_toml(text).map_err(|e| miette::miette!("{name}: {e}"))?;
     let own_serial = certificate.instrument.serial.clone();
     verify(name, &certificate, certificate.kind, &own_serial)?;
@@ -266,7 +266,7 @@ pub fn check(name: &str, text: &str) -> miette::Result<Kind> {
 pub fn verify<'a>(
     name: &str,
     certificate: &'a Certificate,
-    kind: Kind,
+    kind: CertificateKind,
     serial: &str,
 ) -> miette::Result<calibration::certificate::Verified<'a>> {
     let at = calibration::certificate::Circumstances {

@@ -12,7 +12,7 @@ pub mod claims;
 pub mod measured;
 mod page;
 
-use crate::fingertip::Kind;
+use crate::fingertip::FingertipKind;
 use crate::input::{self, Problems};
 use crate::plan::Plan;
 use crate::setup::Setup;
@@ -200,7 +200,7 @@ impl Campaign {
             return Ok(());
         }
         crate::files::make_folder(&folder.join("sessions"))?;
-        let kinds: Vec<Kind> = self.setups.iter().map(|setup| setup.tip.kind).collect();
+        let kinds: Vec<FingertipKind> = self.setups.iter().map(|setup| setup.tip.kind).collect();
         crate::files::write_plain(&folder.join(KINDS), serde_json::json!(kinds).to_string())?;
         crate::files::write_plain(&stored, &self.text)
     }
@@ -279,7 +279,8 @@ pub fn is_complete(run: &Path) -> bool {
 pub fn measured(folder: &Path) -> miette::Result<(CampaignFile, Vec<Measured>)> {
     let path = folder.join(FILE);
     let file: CampaignFile = input::parse_toml(&path.display().to_string(), &input::text_of(&path)?)?;
-    let kinds: Vec<Kind> = serde_json::from_str(&input::text_of(&folder.join(KINDS))?).into_diagnostic()?;
+    let kinds: Vec<FingertipKind> =
+        serde_json::from_str(&input::text_of(&folder.join(KINDS))?).into_diagnostic()?;
     miette::ensure!(
         kinds.len() == file.cell.len(),
         "{}: {KINDS} belongs to another campaign",

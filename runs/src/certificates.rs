@@ -10,12 +10,12 @@ pub mod temperature;
 
 use crate::setup::SetupFile;
 use calibration::amplitude::apply::AmplitudeCalibration;
-use calibration::certificate::{Certificate, Circumstances, Kind, Verified};
+use calibration::certificate::{Certificate, CertificateKind, Circumstances, Verified};
 use calibration::force::apply::ForceCalibration;
 use calibration::force::zero::Zero;
 use models::quantity::PeakToPeak;
 use models::rig_file::Calibration;
-use realtime::ports::{Amplifier, AmplifierState, ForceSensor, Forces, Nanos, NoData, Quality, Reading};
+use realtime::ports::{Amplifier, AmplifierState, ForceSensor, Forces, Nanos, NoData, Quality, Sample};
 use realtime::safety::DriveCommand;
 use realtime::turn::Ports;
 use std::path::Path;
@@ -51,7 +51,7 @@ impl Certificates {
     pub fn load(file: &SetupFile, folder: &Path, now_unix_s: i64) -> Result<Self, String> {
         let mut all = Certificates::default();
         all.calibration.speed_gain_sd = file.speed_gain_sd;
-        let mut seen: Vec<Kind> = Vec::new();
+        let mut seen: Vec<CertificateKind> = Vec::new();
         for path in &file.certificates {
             let path = folder.join(path);
             let name = path.display().to_string();
@@ -73,7 +73,7 @@ impl Certificates {
                 )));
             }
             calibration::prior::take(&mut all.calibration, verified).map_err(|e| fail(e.to_string()))?;
-            if kind == Kind::Force {
+            if kind == CertificateKind::Force {
                 let axes = file.force.iter().flat_map(|i| [&i.lateral, &i.normal]).flatten();
                 if axes.into_iter().any(|a| a.gain != 1.0 || a.offset_n != 0.0) {
                     return Err(fail(
@@ -89,12 +89,12 @@ impl Certificates {
                     (all.calibration.lateral_offset_sd_n, all.calibration.normal_offset_sd_n) = (None, None);
                 }
             }
-            if kind == Kind::Amplitude {
+            if kind == CertificateKind::Amplitude {
                 all.take_amplitude(file, verified).map_err(&fail)?;
             }
             let file_name = path.file_name().map_or(name.clone(), |n| n.to_string_lossy().into_owned());
             // No instrument of force reports a temperature to the loop; the amplifier does.
-            if let (Kind::Amplitude, Some(range_c)) = (kind, certificate.validity.temperature_c) {
+            if let (CertificateKind::Amplitude, Some(range_c)) = (kind, certificate.validity.temperature_c) {
                 let certificate = format!("{kind} certificate ({file_name})");
                 all.temperature_ranges.push(TemperatureRange { certificate, range_c });
             }
@@ -157,11 +157,14 @@ impl Certificates {
 }
 
 /// Serial number that a certificate of that kind must name; `None` where the setup has no such instrument.
-fn serial(file: &SetupFile, kind: Kind) -> Result<Option<String>, String> {
+fn serial(file: &SetupFile, kind: CertificateKind) -> Result<Option<String>, String> {
     let stated: Vec<Option<&String>> = match kind {
-        Kind::Force => file.force.iter().map(|i| i.serial.as_ref()).collect(),
-        Kind::Amplitude => vec![file.amplifier.serial.as_ref()],
-        Kind::Latency | Kind::Phase | Kind::Finger | Kind::Sensor => return Ok(None),
+        CertificateKind::Force => file.force.iter().map(|i| i.serial.as_ref()).collect(),
+        CertificateKind::Amplitude => vec![file.amplifier.serial.as_ref()],
+        CertificateKind::Latency
+        | CertificateKind::Phase
+        | CertificateKind::Finger
+        | CertificateKind::Sensor => return Ok(None),
     };
     let known: Option<Vec<&str>> = stated.into_iter().map(|s| s.map(String::as_str)).collect();
     match known {
@@ -197,7 +200,7 @@ impl ForceSensor for Calibrated {
         };
         let force = self.calibration.apply([lateral.raw as f64, normal.raw as f64], &self.zero);
         let beyond = !self.calibration.in_range(force);
-        let with = |reading: Reading, value: f64| Reading {
+        let with = |reading: Sample, value: f64| Sample {
             value,
             quality: if beyond && reading.quality == Quality::Good {
                 Quality::Degraded
@@ -230,7 +233,7 @@ impl Amplifier for CalibratedAmplifier {
             if drive > 0.0 { self.calibration.free_amplitude(drive) } else { PeakToPeak::from_metres(drive) }
         };
         Ok(AmplifierState {
-            amplitude: state.amplitude.map(|r| Reading { value: plate(r.value).metres(), ..r }),
+            amplitude: state.amplitude.map(|r| Sample { value: plate(r.value).metres(), ..r }),
             echoed_amplitude: plate(state.echoed_amplitude.metres()),
             ..state
         })

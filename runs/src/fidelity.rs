@@ -57,7 +57,7 @@ impl Stated {
         frequencies.sort_by(f64::total_cmp);
         frequencies.dedup();
         let known = frequencies.into_iter().map(|f| (f, known(f))).collect();
-        let grating = render.target == crate::plan::Kind::Grating;
+        let grating = render.target == crate::plan::TargetKind::Grating;
         Stated { tolerance: render.tolerance, known, remarks, period_m: render.period_m.filter(|_| grating) }
     }
 

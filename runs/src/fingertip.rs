@@ -12,7 +12,7 @@ pub struct FingertipFile {
     /// Name in the library.
     pub name: String,
     /// `human`, `artificial` or `probe`.
-    pub kind: Kind,
+    pub kind: FingertipKind,
     /// What it is made of.
     pub material: String,
     /// Radius of the tip in m.
@@ -28,7 +28,7 @@ pub struct FingertipFile {
 /// What kind of tip.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize, schemars::JsonSchema)]
 #[serde(rename_all = "snake_case")]
-pub enum Kind {
+pub enum FingertipKind {
     /// A person's finger: dead-man input and exposure limits apply.
     Human,
     /// An artificial fingertip.
@@ -67,7 +67,7 @@ pub struct Fingertip {
     /// Name.
     pub name: String,
     /// Kind.
-    pub kind: Kind,
+    pub kind: FingertipKind,
     /// Friction coefficient to expect.
     pub mu0: f64,
     /// Springs and moduli.

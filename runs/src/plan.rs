@@ -19,7 +19,7 @@ pub use bundled::BUNDLED;
 pub(crate) use points::series_place;
 pub use points::{PlanProblem, Point, Resolution};
 pub use reach::{Reach, times};
-pub use render::{Control, Kind, RenderPlan};
+pub use render::{Control, RenderPlan, TargetKind};
 pub use steps::{Action, Step, When};
 pub use visible::{COUNTS_MIN, LateralChannel};
 

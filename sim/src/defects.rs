@@ -1,6 +1,6 @@
 //! What can be wrong with this world.
 //!
-//! A defect is a [`Kind`]: a name, a place, its parameters, and what it does at one of four points: to the
+//! A defect is a [`DefectKind`]: a name, a place, its parameters, and what it does at one of four points: to the
 //! world's set-up, to the plate's amplitude under the finger, to the contact, to the forces on their way to
 //! the sensor. Its formulae are this world's own. Where a library effect bears the same name, the cause is
 //! the same and the formula another.
@@ -18,7 +18,7 @@ pub use file::{Defects, DefectsError};
 /// Where a defect sits.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, serde::Serialize)]
 #[serde(rename_all = "snake_case")]
-pub enum Place {
+pub enum Location {
     /// Between finger and plate.
     Contact,
     /// In the fingertip.
@@ -102,11 +102,11 @@ enum Act {
 }
 
 /// A kind of defect.
-pub struct Kind {
+pub struct DefectKind {
     /// Its name: the effect's, where the library has one for the same cause.
     pub name: &'static str,
     /// Where it sits.
-    pub place: Place,
+    pub place: Location,
     /// Whether an effect of that name exists.
     pub in_library: bool,
     /// Whether a table of steady passes can show it.
@@ -121,11 +121,11 @@ pub struct Kind {
     act: Act,
 }
 
-impl Kind {
+impl DefectKind {
     /// A cause that a table of steady passes shows and the library has an effect for.
-    const fn cause(place: Place, summary: &'static str) -> Self {
+    const fn cause(place: Location, summary: &'static str) -> Self {
         let act = Act::Setup(|_, _| {});
-        Kind {
+        DefectKind {
             name: "",
             place,
             in_library: true,
@@ -138,12 +138,12 @@ impl Kind {
     }
 
     /// A fault of the rig, which is none of the causes that a table shows.
-    const fn fault(place: Place, summary: &'static str) -> Self {
-        Kind { in_library: false, in_tables: false, ..Self::cause(place, summary) }
+    const fn fault(place: Location, summary: &'static str) -> Self {
+        DefectKind { in_library: false, in_tables: false, ..Self::cause(place, summary) }
     }
 
     /// The kind of a name.
-    pub fn named(name: &str) -> Option<&'static Kind> {
+    pub fn named(name: &str) -> Option<&'static DefectKind> {
         ALL.iter().copied().find(|kind| kind.name == name)
     }
 
@@ -229,7 +229,7 @@ impl Parameter {
 #[derive(Clone, Copy)]
 pub struct Defect {
     /// What kind.
-    pub kind: &'static Kind,
+    pub kind: &'static DefectKind,
     /// Its parameters' values, in the kind's order.
     pub values: Values,
 }
@@ -252,8 +252,8 @@ const FLYING: [&str; 2] = ["ridge_inertia", "normal_damping"];
 const SHAPED: [&str; 3] = ["multi_asperity", "second_harmonic", "in_plane_motion"];
 
 /// Whether this world can solve two kinds at once.
-pub fn compatible(one: &Kind, other: &Kind) -> bool {
-    let clash = |a: &Kind, b: &Kind| FLYING.contains(&a.name) && SHAPED.contains(&b.name);
+pub fn compatible(one: &DefectKind, other: &DefectKind) -> bool {
+    let clash = |a: &DefectKind, b: &DefectKind| FLYING.contains(&a.name) && SHAPED.contains(&b.name);
     !clash(one, other) && !clash(other, one)
 }
 
@@ -299,7 +299,7 @@ macro_rules! kinds {
     ($($file:ident)*) => {
         $(mod $file;)*
         /// Every kind of defect.
-        pub static ALL: &[&Kind] = &[$(&Kind { name: stringify!($file), ..$file::KIND }),*];
+        pub static ALL: &[&DefectKind] = &[$(&DefectKind { name: stringify!($file), ..$file::KIND }),*];
     };
 }
 

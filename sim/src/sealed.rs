@@ -27,7 +27,7 @@ use models::condition::Condition;
 use models::pass::Pass;
 use serde::{Deserialize, Serialize};
 
-use crate::defects::{ALL, Defect, Defects, Kind};
+use crate::defects::{ALL, Defect, DefectKind, Defects};
 use crate::noise::Noise;
 pub use bench::SetNoise;
 use bench::{Bench, GAP};
@@ -63,8 +63,8 @@ impl Stratum {
         }
     }
 
-    fn kinds(self, noise: &mut Noise) -> Vec<&'static Kind> {
-        let pool: Vec<&'static Kind> = ALL
+    fn kinds(self, noise: &mut Noise) -> Vec<&'static DefectKind> {
+        let pool: Vec<&'static DefectKind> = ALL
             .iter()
             .copied()
             .filter(|kind| kind.in_tables)

@@ -8,7 +8,7 @@ use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
 
 use realtime::ports::{
     Amplifier, AmplifierState, Channel, Contact, Contacts, ForceSensor, Forces, Nanos, NoData, Quality,
-    Reading, SafetyInputs, Stage, StageState, SupplyCommand, SupplyState, SupplySwitch,
+    SafetyInputs, Sample, Stage, StageState, SupplyCommand, SupplyState, SupplySwitch,
 };
 use realtime::safety::{DriveCommand, StageCommand};
 
@@ -57,7 +57,7 @@ fn reading(sample: &ForceSample, axis: usize, unstated: Nanos) -> Channel {
     if !sample.force_n[axis].is_finite() {
         return Err(NoData::Invalid);
     }
-    Ok(Reading {
+    Ok(Sample {
         value: sample.force_n[axis],
         raw: i64::from(sample.counts[axis]),
         taken_at: sample.taken_at.plus(unstated),
@@ -98,7 +98,7 @@ impl Amplifier for VirtualRig {
         let status = self.world.amplifier_status().ok_or(NoData::NeverRead)?;
         let channel = |value: f64, raw: i64| {
             let (taken_at, sequence) = (status.taken_at, status.sequence);
-            Ok(Reading { value, raw, taken_at, sequence, quality: Quality::Good })
+            Ok(Sample { value, raw, taken_at, sequence, quality: Quality::Good })
         };
         Ok(AmplifierState {
             amplitude: channel(status.measured_pp_m, status.measured_counts),

@@ -56,7 +56,7 @@ fn change(defects: &Defects) -> f64 {
 }
 
 /// The defect with its size at a share of its range and the other parameters at a share of theirs.
-fn sized(kind: &'static muprime_sim::defects::Kind, share: f64, shape: f64) -> Defects {
+fn sized(kind: &'static muprime_sim::defects::DefectKind, share: f64, shape: f64) -> Defects {
     use muprime_sim::defects::Draw;
     let mut values = Values::default();
     for (i, (value, p)) in values.iter_mut().zip(kind.parameters).enumerate() {

@@ -2,7 +2,7 @@
 //! cannot tell apart (k_n w / F and k_l U / (f mu0 k_n w) are all that mu' depends on), and causes of different kinds.
 
 use models::quantity::PeakToPeak;
-use muprime_sim::defects::{Defect, Defects, Kind, Surroundings};
+use muprime_sim::defects::{Defect, DefectKind, Defects, Surroundings};
 use muprime_sim::finger::{Finger, FingerConfig};
 use muprime_sim::sealed::imitate::Imitator;
 use muprime_sim::sealed::oracle::Case;
@@ -75,7 +75,7 @@ fn asked_beside(
     let base = case.fit(&Defects::none(), 8);
     let truth: Vec<Defect> = truth
         .iter()
-        .map(|name| Defect { kind: Kind::named(name).unwrap(), values: Default::default() })
+        .map(|name| Defect { kind: DefectKind::named(name).unwrap(), values: Default::default() })
         .collect();
     (base.chi2, case.imitators(&truth, &base, 0.0, false))
 }
@@ -85,7 +85,7 @@ fn left(list: &[Imitator], name: &str) -> f64 {
 }
 
 fn one(name: &str, values: [f64; 4]) -> Defects {
-    Defects { defects: vec![Defect { kind: Kind::named(name).unwrap(), values }], channels: Vec::new() }
+    Defects { defects: vec![Defect { kind: DefectKind::named(name).unwrap(), values }], channels: Vec::new() }
 }
 
 #[test]

@@ -30,7 +30,7 @@ use models::pass::{Pass, read_passes};
 use serde::Serialize;
 use series::Spread;
 use std::path::Path;
-use targets::{Id, Kind, TARGETS};
+use targets::{ColumnKind, Id, TARGETS};
 use values::{Dropped, Values};
 
 pub use grid::Grid;
@@ -523,7 +523,7 @@ pub fn guessed_lines(map: &Map) -> Vec<String> {
         } else {
             ""
         };
-        let unit = if matches!(target.kind, Kind::Number(_)) {
+        let unit = if matches!(target.kind, ColumnKind::Number(_)) {
             format!(" in {}", c.unit_text)
         } else {
             String::new()

@@ -10,7 +10,7 @@ use calibration::amplitude::gain::{Form, fit};
 use calibration::amplitude::map::mode_shape;
 use calibration::amplitude::resonance::sweep;
 use calibration::amplitude::vibrometer::{Decoder, sine};
-use calibration::certificate::{Kind, Outcome};
+use calibration::certificate::{CertificateKind, Outcome};
 use calibration::uncertainty::student::coverage_factor;
 use models::quantity::PeakToPeak;
 use realtime::ports::Nanos;
@@ -192,9 +192,10 @@ fn gain_resonance_droop_are_covered_as_stated() {
         drooped.add_with_bound(ci(&outcome, "droop"), load_ratio, half[3], bound[3]);
         if trial == 0 {
             let certificate = outcome.certify(&occasion());
-            let use_it =
-                AmplitudeCalibration::compile(certificate.verify(&at(Kind::Amplitude, "F-0017")).unwrap())
-                    .unwrap();
+            let use_it = AmplitudeCalibration::compile(
+                certificate.verify(&at(CertificateKind::Amplitude, "F-0017")).unwrap(),
+            )
+            .unwrap();
             let w = PeakToPeak::from_metres(1.5e-6);
             let s = use_it.free_set_point(w).unwrap();
             assert!((use_it.free_amplitude(s).metres() / w.metres() - 1.0).abs() < 1e-12);

@@ -1,7 +1,7 @@
 //! Force: withheld gains, cross-talk, offsets, load errors and directions are recovered as stated.
 
 use crate::bench::{AVERAGE_S, Coverage, ForceBench, PERIOD_S, seed, trials};
-use calibration::certificate::{Certificate, Circumstances, Instrument, Kind, Occasion, RawData};
+use calibration::certificate::{Certificate, CertificateKind, Circumstances, Instrument, Occasion, RawData};
 use calibration::force::apply::ForceCalibration;
 use calibration::force::matrix::{ForceError, Linearity, Options, Term, fit};
 use calibration::force::series::{LoadReading, Weighing};
@@ -20,7 +20,7 @@ pub fn occasion() -> Occasion {
     }
 }
 
-pub fn at(kind: Kind, serial: &str) -> Circumstances<'_> {
+pub fn at(kind: CertificateKind, serial: &str) -> Circumstances<'_> {
     Circumstances { kind, serial, now_unix_s: 1_800_000_000 + 86_400, temperature_c: Some(22.0) }
 }
 
@@ -90,7 +90,7 @@ fn gains_and_cross_talk_are_covered_as_stated() {
         // Through the file and the gate into the loop: a force that was not in the series.
         let text = outcome.certify(&occasion()).to_toml();
         let certificate = Certificate::from_toml(&text).unwrap();
-        let verified = certificate.verify(&at(Kind::Force, "F-0017")).unwrap();
+        let verified = certificate.verify(&at(CertificateKind::Force, "F-0017")).unwrap();
         let calibration = ForceCalibration::compile(verified, Some(22.0)).unwrap();
         let row_sd: Vec<f64> = (0..2).map(|a| found.scatter[(a, a)].sqrt()).collect();
         let (zero_counts, time_s, _) = bench.read(0.0, 0.0);

@@ -4,7 +4,9 @@ use super::droop::{Droop, Exponent};
 use super::gain::GainFit;
 use super::map::ModeShape;
 use super::resonance::Resonance;
-use crate::certificate::{BudgetLine, Finding, Kind, Outcome, Refusal, Residuals, Verified, parameters};
+use crate::certificate::{
+    BudgetLine, CertificateKind, Finding, Outcome, Refusal, Residuals, Verified, parameters,
+};
 use models::quantity::PeakToPeak;
 use std::collections::BTreeMap;
 use std::f64::consts::PI;
@@ -74,7 +76,7 @@ impl AmplitudeFit {
         let sd = gain.fit.residual_sd();
         let covariance = Finding::covariance(&findings, &blocks);
         Outcome {
-            kind: Kind::Amplitude,
+            kind: CertificateKind::Amplitude,
             model:
                 "w(s, x, F) = (gain s [+ offset] [+ bend s^2]) shape(x) / shape(x_table) / (1 + droop F^p), \
                     shape(x) = 1 - d + d |cos(2 pi (x - x0) / lambda)|, w peak-to-peak"

@@ -1,13 +1,13 @@
 //! The gate between a certificate file and its use.
 
-use super::{Certificate, Kind, date};
+use super::{Certificate, CertificateKind, date};
 use nalgebra::DMatrix;
 
 /// Where, when and on what a certificate is to be used.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Circumstances<'a> {
     /// What the user needs calibrated.
-    pub kind: Kind,
+    pub kind: CertificateKind,
     /// Serial number of the instrument at hand.
     pub serial: &'a str,
     /// Now, in seconds since 1970 (UTC).
@@ -42,7 +42,7 @@ pub enum Refusal {
     Foreign { expected: String, found: String },
     /// It is about another quantity.
     #[error("this is a {found} certificate; a {expected} certificate is needed")]
-    Kind { expected: Kind, found: Kind },
+    Kind { expected: CertificateKind, found: CertificateKind },
     /// Its time is over.
     #[error("the certificate ran out at {until} ({days:.1} days ago): calibrate again")]
     Stale { until: String, days: f64 },

@@ -5,7 +5,7 @@ use super::series::Weighing;
 use super::zero::Zero;
 use super::{AXES, Axis};
 use crate::certificate::{
-    BudgetLine, Finding, Kind, Outcome, Parameter, Refusal, Residuals, Verified, parameters,
+    BudgetLine, CertificateKind, Finding, Outcome, Parameter, Refusal, Residuals, Verified, parameters,
 };
 use nalgebra::{Matrix2, Vector2};
 use std::collections::BTreeMap;
@@ -59,7 +59,7 @@ impl ForceFit {
             budget.push(BudgetLine::b(format!("direction of the {a} pull"), sd, "rad"));
         }
         Outcome {
-            kind: Kind::Force,
+            kind: CertificateKind::Force,
             model: "counts_i = offset_i + sum_j (gain_ij F_j + square_ij F_j^2) + drift_i (t - mean t) \
                     + hysteresis_ij b 4 s (1 - s) + temperature"
                 .into(),

@@ -1,6 +1,6 @@
 //! What a force sensor is besides its matrix, as a certificate: creep, orientation, noise, dynamics.
 
-use crate::certificate::{BudgetLine, Finding, Kind, Outcome, Residuals, parameters};
+use crate::certificate::{BudgetLine, CertificateKind, Finding, Outcome, Residuals, parameters};
 use std::collections::BTreeMap;
 
 /// The certificate's contents of a set of findings that were determined apart (their correlations are not stated).
@@ -8,7 +8,7 @@ pub fn outcome(model: &str, findings: &[Finding], residuals: Residuals, remarks:
     let line = |f: &Finding| BudgetLine::a(format!("statistics of {}", f.name), f.estimate[1], &f.unit);
     let covariance = Finding::covariance(findings, &[]);
     Outcome {
-        kind: Kind::Sensor,
+        kind: CertificateKind::Sensor,
         model: model.into(),
         settings: BTreeMap::new(),
         remarks,

@@ -1,7 +1,7 @@
 //! The certificate of a phase calibration.
 
 use super::RepeatedShift;
-use crate::certificate::{BudgetLine, Finding, Kind, Outcome, Residuals, parameters};
+use crate::certificate::{BudgetLine, CertificateKind, Finding, Outcome, Residuals, parameters};
 use models::quantity::PeakToPeak;
 use nalgebra::DMatrix;
 use std::collections::BTreeMap;
@@ -49,7 +49,7 @@ pub fn outcome(found: &[(PeakToPeak, RepeatedShift)], at: &Acquisition) -> Outco
     settings.extend(at.condition.iter().map(|c| ("condition".to_string(), c.clone())));
     settings.extend(at.normal_force_n.iter().map(|f| ("normal_force_n".to_string(), f.to_string())));
     Outcome {
-        kind: Kind::Phase,
+        kind: CertificateKind::Phase,
         model: "Phi = 360 |t_pa - t_sa| / T (Eq. 1), mean on the circle over repeats".into(),
         settings,
         remarks,

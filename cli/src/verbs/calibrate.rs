@@ -6,7 +6,6 @@ use rig::bench::AtTheBench;
 use runs::calibrate::{Issued, What, certified, verify};
 use runs::report::human::{number, to_its_uncertainty};
 
-/// Arguments.
 #[derive(Debug, clap::Args)]
 pub struct Args {
     #[command(subcommand)]

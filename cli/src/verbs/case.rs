@@ -6,7 +6,6 @@ use studies::cases::share::Share;
 use studies::cases::study::Study;
 use studies::cases::worker::{Done, work};
 
-/// Arguments.
 #[derive(Debug, clap::Args)]
 pub struct Args {
     /// The file of cases

@@ -9,7 +9,6 @@ use std::collections::BTreeMap;
 use studies::cases::file::{self, Header};
 use studies::cases::kinds::{self, blind, diagnose, finger, noop, ridge, table};
 
-/// Arguments.
 #[derive(Debug, clap::Args)]
 pub struct Args {
     #[command(subcommand)]

@@ -5,7 +5,6 @@ use runs::print::folded;
 use runs::setup::Setup;
 use tables::check::{Good, On, kind_of, problems_of};
 
-/// Arguments.
 #[derive(Debug, clap::Args)]
 pub struct Args {
     /// Files of any kind, folders of runs, or bundled names: plans, setups, profiles, fingertips, rig.toml, point tables, models,

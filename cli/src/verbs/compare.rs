@@ -13,7 +13,6 @@ const PRINTED: usize = 5;
 /// Longest value in the table of differences, in characters.
 const SHOWN: usize = 24;
 
-/// Arguments.
 #[derive(Debug, clap::Args)]
 pub struct Args {
     /// Folder of the first run

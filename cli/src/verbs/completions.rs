@@ -3,7 +3,6 @@
 use super::prelude::*;
 use clap_complete::Shell;
 
-/// Arguments.
 #[derive(Debug, clap::Args)]
 pub struct Args {
     /// The shell.

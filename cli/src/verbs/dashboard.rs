@@ -5,7 +5,6 @@ use rig::dashboard::{Dashboard, LISTEN, Options};
 use runs::catalogue::runs_folder;
 use std::net::SocketAddr;
 
-/// Arguments.
 #[derive(Debug, clap::Args)]
 pub struct Args {
     /// Folder of the runs [default: $MUPRIME_RUNS or ./runs]

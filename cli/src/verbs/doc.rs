@@ -2,7 +2,6 @@
 
 use super::prelude::*;
 
-/// Arguments.
 #[derive(Debug, clap::Args)]
 pub struct Args {
     #[command(subcommand)]

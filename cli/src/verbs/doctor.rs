@@ -15,7 +15,6 @@ use sim::wire::world::WorldPlant;
 use sim::world::World;
 use std::time::{Duration, Instant};
 
-/// Arguments.
 #[derive(Debug, clap::Args)]
 #[command(args_conflicts_with_subcommands = true)]
 pub struct Args {

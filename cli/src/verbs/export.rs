@@ -4,7 +4,6 @@ use super::prelude::*;
 use tables::export::facts::Stated;
 use tables::export::{Format, export};
 
-/// Arguments.
 #[derive(Debug, clap::Args)]
 pub struct Args {
     /// Folder of the run

@@ -34,7 +34,6 @@ impl Scenes {
     }
 }
 
-/// Arguments.
 #[derive(Debug, clap::Args)]
 pub struct Args {
     #[command(flatten)]

@@ -4,7 +4,6 @@ use super::prelude::*;
 use studies::cases::gather::gather;
 use studies::cases::study::Study;
 
-/// Arguments.
 #[derive(Debug, clap::Args)]
 pub struct Args {
     /// Folder of the results

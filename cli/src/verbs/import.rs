@@ -11,7 +11,6 @@ use tables::import::guess::guess;
 use tables::import::map::Map;
 use tables::import::{Cut, Grid, Imported, Marks, Wanted, guessed_lines, import, read};
 
-/// Arguments.
 #[derive(Debug, clap::Args)]
 pub struct Args {
     /// The table: delimited text, Excel or OpenDocument, Parquet, NumPy

@@ -4,7 +4,6 @@ use super::prelude::*;
 use runs::files::write_whole;
 use tables::schemas::init::{Kind, text};
 
-/// Arguments.
 #[derive(Debug, clap::Args)]
 pub struct Args {
     /// What to begin

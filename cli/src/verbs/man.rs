@@ -3,7 +3,6 @@
 use super::prelude::*;
 use runs::files::{make_folder, write_whole};
 
-/// Arguments.
 #[derive(Debug, clap::Args)]
 pub struct Args {
     /// Folder that gets muprime.1, muprime-run.1, ...

@@ -6,7 +6,6 @@ use runs::files::{self, Placed};
 use std::fs::{self, File};
 use std::io::BufReader;
 
-/// Arguments.
 #[derive(Debug, clap::Args)]
 pub struct Args {
     /// A record (.mcap)

@@ -12,7 +12,6 @@ use std::fs::File;
 use std::io::BufReader;
 use std::sync::Arc;
 
-/// Arguments.
 #[derive(Debug, clap::Args)]
 pub struct Args {
     /// Folder of a run, or one of its records

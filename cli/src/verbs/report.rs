@@ -7,7 +7,6 @@ use serde_json::json;
 use std::path::PathBuf;
 use std::process::ExitCode;
 
-/// Arguments.
 #[derive(Debug, clap::Args)]
 pub struct Args {
     /// Folder of the run, or of the campaign

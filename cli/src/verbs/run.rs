@@ -38,7 +38,6 @@ fn fitted(text: String) -> String {
     if std::io::stderr().is_terminal() { folded(&text, 2) } else { text }
 }
 
-/// Arguments.
 #[derive(Clone, Debug, clap::Args)]
 pub struct Args {
     /// Plan or campaign: a file, a bundled name ('muprime show' lists all), or the folder of a campaign

@@ -4,7 +4,6 @@ use super::prelude::*;
 use runs::catalogue::{Annotations, RunEntry, SortBy, existing, runs_folder, sort};
 use runs::print::folded;
 
-/// Arguments.
 #[derive(Debug, clap::Args)]
 pub struct Args {
     /// Folder of one run, to tag it or to write its note; without it all runs are listed

@@ -3,7 +3,6 @@
 use super::prelude::*;
 use tables::schemas::schema::Kind;
 
-/// Arguments.
 #[derive(Debug, clap::Args)]
 pub struct Args {
     /// Kind of file

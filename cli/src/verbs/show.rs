@@ -7,7 +7,6 @@ use runs::print::folded;
 use sample::Sample;
 use tables::schemas::bundled::all;
 
-/// Arguments.
 #[derive(Debug, clap::Args)]
 pub struct Args {
     /// Name of a plan, setup, fingertip or profile; without it all are listed

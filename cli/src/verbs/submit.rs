@@ -5,7 +5,6 @@ use studies::cases::engines::quoted;
 use studies::cases::study::Study;
 use studies::cases::submit::{Options, cancel, checked, submit, tasks};
 
-/// Arguments.
 #[derive(Debug, clap::Args)]
 pub struct Args {
     /// The file of cases

@@ -12,7 +12,6 @@ use std::io::BufRead;
 use std::net::SocketAddr;
 use std::time::Instant;
 
-/// Arguments.
 #[derive(Debug, clap::Args)]
 pub struct Args {
     /// Setup whose instruments are served

@@ -7,7 +7,6 @@ use runs::sequence::MeasuredPass;
 use std::io::{BufRead, BufReader, IsTerminal};
 use std::time::Duration;
 
-/// Arguments.
 #[derive(Debug, clap::Args)]
 pub struct Args {
     /// Folder of the run [default: the newest]

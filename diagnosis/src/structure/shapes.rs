@@ -38,7 +38,7 @@ const ENDS: [f64; 2] = [0.025, 0.975];
 /// What a shape is.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, serde::Serialize, schemars::JsonSchema)]
 #[serde(rename_all = "snake_case")]
-pub enum Kind {
+pub enum ShapeKind {
     /// Another level from some place on.
     Jump,
     /// A place of its own: a spot, a spell, a resonance.
@@ -51,7 +51,7 @@ pub enum Kind {
 #[derive(Debug, Clone)]
 pub struct Shape {
     /// What it is.
-    pub kind: Kind,
+    pub kind: ShapeKind,
     /// Over what.
     pub covariate: &'static Covariate,
     /// Whether it turns with the direction, as friction does.
@@ -67,7 +67,7 @@ pub struct Shape {
 
 /// Shapes of one kind over one covariate: where each is, and a column for each.
 struct Family {
-    kind: Kind,
+    kind: ShapeKind,
     covariate: &'static Covariate,
     way: Way,
     at: Vec<f64>,
@@ -242,7 +242,7 @@ fn families(part: &Problem, u: &[f64], prediction: &DVector<f64>) -> Vec<Family>
 type Placed = (f64, Form, Vec<f64>);
 
 /// The shapes that a covariate may have: none where it has few levels, for there a jump is a law.
-fn over(part: &Problem, covariate: &Covariate, values: &[f64]) -> Vec<(Kind, Vec<Placed>)> {
+fn over(part: &Problem, covariate: &Covariate, values: &[f64]) -> Vec<(ShapeKind, Vec<Placed>)> {
     let largest = part.design.largest_amplitude_m;
     let x: Vec<f64> = values.iter().map(|v| covariate.scaled(*v, largest)).collect();
     let mut order: Vec<usize> = (0..x.len()).collect();
@@ -284,7 +284,7 @@ fn over(part: &Problem, covariate: &Covariate, values: &[f64]) -> Vec<(Kind, Vec
             count += PERIODS.2;
         }
     }
-    let all = [(Kind::Jump, jumps), (Kind::Bump, bumps), (Kind::Period, periods)];
+    let all = [(ShapeKind::Jump, jumps), (ShapeKind::Bump, bumps), (ShapeKind::Period, periods)];
     all.into_iter().filter(|(_, list)| !list.is_empty()).collect()
 }
 
@@ -316,7 +316,7 @@ mod tests {
             let (_, none) = crate::evidence::averaged_over_form(&problem, &fit, &[], &basis);
             let best = &shapes(&problem, &none, &scatter)[0];
             let gap = problem.misfit(&none.prediction) - problem.len() as f64;
-            assert_eq!((best.kind, best.covariate.name), (Kind::Jump, "time_s"), "{best:?}");
+            assert_eq!((best.kind, best.covariate.name), (ShapeKind::Jump, "time_s"), "{best:?}");
             assert!(best.size.0 * (factor - 1.0) > 0.0, "{factor}: {:?}", best.size);
             assert!(best.nats > 0.35 * gap, "{} nats of a gap of {gap}", best.nats);
         }

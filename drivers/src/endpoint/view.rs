@@ -4,7 +4,7 @@ use super::SampleMark;
 use instruments::profile::Refusal;
 use instruments::schema::Severity;
 use instruments::{FrameId, Profile, SignalId, Values};
-use realtime::ports::{Channel, NoData, Quality, Reading};
+use realtime::ports::{Channel, NoData, Quality, Sample};
 
 /// A decoded frame and what is needed to make readings of it.
 pub(super) struct View<'a> {
@@ -39,7 +39,7 @@ impl View<'_> {
         } else {
             0
         };
-        Ok(Reading {
+        Ok(Sample {
             value: self.si(signal),
             raw,
             taken_at: self.mark.taken_at,

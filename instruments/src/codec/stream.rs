@@ -155,7 +155,8 @@ mod tests {
         let mut bytes = vec![7, 7, 7, 7, 7];
         let mut sent = Vec::new();
         for i in 0..200_u8 {
-            let mut frame: Vec<u8> = (0..12).map(|j| i.wrapping_mul(37).wrapping_add(j * 91)).collect();
+            let mut frame: Vec<u8> =
+                (0..12u8).map(|j| i.wrapping_mul(37).wrapping_add(j.wrapping_mul(91))).collect();
             frame.push(Check::Sum7WithErrorBit.of(&frame, None)[0]);
             bytes.extend(&frame);
             sent.push(frame);

@@ -1,7 +1,7 @@
 //! What a candidate effect is.
 
 use crate::contact::Contact;
-use crate::operating::{Design, Reading};
+use crate::operating::{Design, SensorError};
 use crate::own::OwnTable;
 use models::condition::Condition;
 use models::covariate::{self, Covariate};
@@ -11,7 +11,7 @@ use serde::Serialize;
 /// Where an effect sits.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash, Serialize)]
 #[serde(rename_all = "snake_case")]
-pub enum Place {
+pub enum Location {
     /// Between skin and plate.
     Contact,
     /// In the finger.
@@ -22,17 +22,18 @@ pub enum Place {
     Instrument,
 }
 
-impl Place {
+impl Location {
     /// Every place.
-    pub const ALL: [Place; 4] = [Place::Contact, Place::Finger, Place::Plate, Place::Instrument];
+    pub const ALL: [Location; 4] =
+        [Location::Contact, Location::Finger, Location::Plate, Location::Instrument];
 
     /// Its name in a verdict.
     pub const fn name(self) -> &'static str {
         match self {
-            Place::Contact => "contact",
-            Place::Finger => "finger",
-            Place::Plate => "plate",
-            Place::Instrument => "instrument",
+            Location::Contact => "contact",
+            Location::Finger => "finger",
+            Location::Plate => "plate",
+            Location::Instrument => "instrument",
         }
     }
 }
@@ -344,7 +345,7 @@ pub struct Effect {
     /// Name as docs/contract.md has it.
     pub name: &'static str,
     /// Where it sits.
-    pub place: Place,
+    pub place: Location,
     /// One sentence on the mechanism.
     pub summary: &'static str,
     /// Where form and ranges come from.
@@ -385,14 +386,14 @@ pub struct Effect {
     pub change: fn(usize, &[f64], &Condition, &Design, &mut Contact),
     /// Changes what the instruments make of the friction force.
     #[serde(skip)]
-    pub read: fn(usize, &[f64], &Condition, &Design, &mut Reading),
+    pub read: fn(usize, &[f64], &Condition, &Design, &mut SensorError),
 }
 
 impl Effect {
     /// A cause without a name that changes nothing: what a cause does not state is as here.
     pub const NONE: Effect = Effect {
         name: "",
-        place: Place::Contact,
+        place: Location::Contact,
         summary: "",
         source: "",
         laws: &[],

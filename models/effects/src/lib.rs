@@ -11,7 +11,7 @@
 //! | [`corrected`] | the corrected model that a run loads |
 //!
 //! An effect changes what the contact is given ([`contact::Contact`]) or what the instruments make of the
-//! force ([`operating::Reading`]); the contact itself is solved in one place. Effects therefore combine, and
+//! force ([`operating::SensorError`]); the contact itself is solved in one place. Effects therefore combine, and
 //! each nests the baseline exactly. To add one: a file in `library/`, and its line in [`mod@library`]'s list.
 //!
 //! ```
@@ -45,8 +45,8 @@ pub mod operating;
 pub mod own;
 pub mod predict;
 
-pub use effect::{Acts, Check, Effect, Input, Law, Need, Parameter, Place, Prior, STATED_AT_N};
+pub use effect::{Acts, Check, Effect, Input, Law, Location, Need, Parameter, Prior, STATED_AT_N};
 pub use library::{imitated, known, library, near, one_cause, twins};
-pub use operating::{Baseline, Design, Reading};
+pub use operating::{Baseline, Design, SensorError};
 pub use own::{at, by_name, own};
 pub use predict::{Active, lateral_force, lateral_force_with, rough_lateral_force};

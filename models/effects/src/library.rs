@@ -10,7 +10,7 @@ use crate::own::by_name;
 /// What every cause's file needs.
 mod prelude {
     pub use crate::contact::Contact;
-    pub use crate::effect::{Acts, Effect, Input, Law, Need, Parameter, Place, STATED_AT_N};
+    pub use crate::effect::{Acts, Effect, Input, Law, Location, Need, Parameter, STATED_AT_N};
     pub use crate::operating::{Design, LEAST_SHARE, atmospheres};
     pub use models::condition::Condition;
     pub use models::covariate;

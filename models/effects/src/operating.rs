@@ -35,7 +35,7 @@ pub struct Baseline {
 
 /// How the instruments turn the friction force into a reading.
 #[derive(Debug, Clone, Copy, PartialEq)]
-pub struct Reading {
+pub struct SensorError {
     /// Factor on the lateral force.
     pub gain: f64,
     /// Lateral force read per newton of normal force, the same in both directions.

@@ -14,7 +14,7 @@
 //! 40,0.3
 //! ```
 
-use crate::effect::{Effect, Law, Parameter, Place};
+use crate::effect::{Effect, Law, Location, Parameter};
 use crate::library::{KNOWN, library};
 use models::condition::{Condition, OutOfDomain};
 use models::law_table::{Answers, LawTable};
@@ -101,7 +101,7 @@ pub fn own(name: &str, text: &str) -> Result<usize, String> {
         text.lines().take_while(|line| line.starts_with('#')).find_map(of)
     };
     let place = stated("place:").unwrap_or_else(|| "contact".into());
-    let place = Place::ALL
+    let place = Location::ALL
         .into_iter()
         .find(|p| p.name() == place)
         .ok_or_else(|| format!("place '{place}': contact, finger, plate or instrument is needed"))?;

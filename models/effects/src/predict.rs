@@ -2,7 +2,7 @@
 
 use crate::contact::{Contact, mean_friction};
 use crate::effect::{Effect, Input};
-use crate::operating::{Baseline, Design, LEAST_SHARE, Reading};
+use crate::operating::{Baseline, Design, LEAST_SHARE, SensorError};
 use models::condition::Condition;
 
 /// An effect with the law and parameters at which it acts.
@@ -50,7 +50,7 @@ fn read(
     pass: &Condition,
     design: &Design,
 ) -> f64 {
-    let mut reading = Reading { gain: 1.0, crosstalk: 0.0, offset_n: 0.0 };
+    let mut reading = SensorError { gain: 1.0, crosstalk: 0.0, offset_n: 0.0 };
     for active in effects {
         (active.effect.change)(active.law, active.theta, pass, design, &mut contact);
         (active.effect.read)(active.law, active.theta, pass, design, &mut reading);
@@ -75,7 +75,7 @@ fn read(
         None => {}
     }
     let friction = pass.direction.sign() * mean_friction(&contact);
-    if reading == (Reading { gain: 1.0, crosstalk: 0.0, offset_n: 0.0 }) {
+    if reading == (SensorError { gain: 1.0, crosstalk: 0.0, offset_n: 0.0 }) {
         return friction;
     }
     reading.gain * friction + reading.crosstalk * contact.normal_force + reading.offset_n

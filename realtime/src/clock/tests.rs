@@ -2,7 +2,7 @@
 //! test.
 
 use super::*;
-use crate::ports::Reading;
+use crate::ports::Sample;
 use crate::safety::ChannelTiming;
 
 const MS: u64 = 1_000_000;
@@ -128,7 +128,7 @@ fn whoever_never_comes_back_is_given_up() {
     let (hangs, lives) = (bench.slot(), bench.slot());
     bench.promise(hangs, MS);
     let sample =
-        Reading { value: 0.1, raw: 1, taken_at: Nanos(0), sequence: 1, quality: crate::ports::Quality::Good };
+        Sample { value: 0.1, raw: 1, taken_at: Nanos(0), sequence: 1, quality: crate::ports::Quality::Good };
     let limit = ChannelTiming { period: Nanos(MS), latency: Nanos(45 * MS), periods: 1 };
     for n in 0..11_000 {
         bench.promise(lives, bench.now() + MS);

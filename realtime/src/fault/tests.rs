@@ -28,9 +28,9 @@ fn always(target: Target, mode: FaultMode, strength: f64) -> Fault {
 }
 
 /// The sample of a cycle: each has its own value, count and time.
-fn nth(cycle: u64) -> Reading {
+fn nth(cycle: u64) -> Sample {
     let quality = Quality::Good;
-    Reading {
+    Sample {
         value: cycle as f64 + 0.25,
         raw: 10 * cycle as i64,
         taken_at: at(cycle),
@@ -142,7 +142,7 @@ fn the_dice_are_uniform_from_zero_to_below_one() {
 fn each_channel_and_each_seed_has_its_own_dice() {
     let targets =
         [Target::Lateral, Target::Normal, Target::Force, Target::Amplifier, Target::Drive, Target::Stage];
-    let first = |target: Target, seed: u64| Line::<Reading>::new([target, target], &[], seed).dice.bits();
+    let first = |target: Target, seed: u64| Line::<Sample>::new([target, target], &[], seed).dice.bits();
     let mut seen = std::collections::HashSet::new();
     for target in targets {
         for seed in (0..64).map(|bit| 0xA5A5_5A5A_0000_0000 ^ (1 << bit)) {

@@ -2,7 +2,7 @@
 #![allow(clippy::disallowed_types)]
 
 use super::*;
-use crate::ports::{Contact, Quality, Reading};
+use crate::ports::{Contact, Quality, Sample};
 use proptest::prelude::*;
 use std::sync::atomic::{AtomicU32, Ordering};
 
@@ -18,9 +18,9 @@ fn limits() -> Limits {
     Limits::paper(T).checked().unwrap()
 }
 
-fn reading(value: f64, sequence: u32, taken_at: Nanos) -> Reading {
+fn reading(value: f64, sequence: u32, taken_at: Nanos) -> Sample {
     let raw = (value * 1e4).round() as i64 * 7 + i64::from(sequence % 5);
-    Reading { value, raw, taken_at, sequence, quality: Quality::Good }
+    Sample { value, raw, taken_at, sequence, quality: Quality::Good }
 }
 
 /// A healthy rig in cycle `n`, driven as commanded.
@@ -138,11 +138,11 @@ fn stage(seen: &mut Observation) -> &mut StageState {
     seen.stage.as_mut().unwrap()
 }
 
-fn normal(seen: &mut Observation) -> &mut Reading {
+fn normal(seen: &mut Observation) -> &mut Sample {
     seen.forces.normal.as_mut().unwrap()
 }
 
-fn lateral(seen: &mut Observation) -> &mut Reading {
+fn lateral(seen: &mut Observation) -> &mut Sample {
     seen.forces.lateral.as_mut().unwrap()
 }
 
@@ -456,12 +456,12 @@ fn the_command_expires_and_counts() {
     assert_eq!((second.drive.frequency_hz(), second.stage.normal_force_n()), (27_500.0, 0.25));
 }
 
-fn any_channel() -> impl Strategy<Value = Result<Reading, NoData>> {
+fn any_channel() -> impl Strategy<Value = Result<Sample, NoData>> {
     let value = prop_oneof![any::<f64>(), -3.0..3.0f64];
     let quality = prop_oneof![Just(Quality::Good), Just(Quality::Degraded), Just(Quality::Saturated)];
     prop_oneof![
         (value, any::<i64>(), any::<u64>(), any::<u32>(), quality).prop_map(
-            |(value, raw, at, sequence, quality)| Ok(Reading {
+            |(value, raw, at, sequence, quality)| Ok(Sample {
                 value,
                 raw,
                 taken_at: Nanos(at),

@@ -3,15 +3,15 @@
 use super::envelope::Envelope;
 use super::exposure::Exposure;
 use super::{ChannelTiming, Controls, Decision, Limits, Observation};
-use crate::signals::{Channel, Nanos, NoData, Quality, Reading, SupplyCommand};
+use crate::signals::{Channel, Nanos, NoData, Quality, Sample, SupplyCommand};
 
 /// Memory of one force channel.
 #[derive(Clone, Copy, Debug, Default)]
 pub(super) struct ForceWatch {
     /// The last sample that was believed.
-    pub believed: Option<Reading>,
+    pub believed: Option<Sample>,
     /// The value before it, for rates.
-    earlier: Option<Reading>,
+    earlier: Option<Sample>,
     /// A far-off sample that the next one must confirm.
     suspect: bool,
     /// New samples in a row with the same raw counts.
@@ -186,7 +186,7 @@ pub(super) struct Watch {
     pub off_since: Option<Nanos>,
     /// How long and how strongly the plate was driven.
     pub exposure: Exposure,
-    amplitude: Option<Reading>,
+    amplitude: Option<Sample>,
     /// States in a row whose amplitude was at the end of its range, and whose raw amplitude was that before.
     pub amplitude_saturated_in_a_row: u32,
     pub amplitude_equal_in_a_row: u32,

@@ -5,7 +5,7 @@
 //! contradicted by that, never by a difference that is merely not significant.
 
 use super::measured::{Effect, Measured, contrast, ends, mean};
-use crate::fingertip::Kind;
+use crate::fingertip::FingertipKind;
 use crate::report::human::number;
 use models::covariate::{self, Covariate};
 use models::prediction::{EmpiricalPsi, FrictionModel, SpringSlider, Validity};
@@ -246,7 +246,9 @@ fn beside<M: FrictionModel>(
 /// How far human and artificial tips lie apart beside one law.
 fn kinds(sessions: &[Measured]) -> Result<(Effect, String), String> {
     let of = |human: bool| -> Vec<f64> {
-        let own = sessions.iter().filter(|s| s.kind != Kind::Probe && (s.kind == Kind::Human) == human);
+        let own = sessions
+            .iter()
+            .filter(|s| s.kind != FingertipKind::Probe && (s.kind == FingertipKind::Human) == human);
         let departure = |s: &Measured| {
             let law = EmpiricalPsi::paper(s.finger).ok()?;
             mean(

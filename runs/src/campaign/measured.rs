@@ -5,7 +5,7 @@
 //! equal settings, and its interval is Student's over sessions.
 
 use super::Session;
-use crate::fingertip::Kind;
+use crate::fingertip::FingertipKind;
 use crate::report::levels::Levels;
 use crate::sequence::MeasuredPass;
 use models::condition::Condition;
@@ -44,7 +44,7 @@ pub struct Measured {
     /// The session.
     pub session: Session,
     /// Kind of its tip.
-    pub kind: Kind,
+    pub kind: FingertipKind,
     /// Its finger, as `rig.toml` has it.
     pub finger: Finger,
     /// Coulomb friction coefficient of its passes without vibration; `None` without any.
@@ -55,7 +55,7 @@ pub struct Measured {
 
 impl Measured {
     /// The passes of a session.
-    pub fn new(session: Session, kind: Kind, finger: Finger, passes: &[MeasuredPass]) -> Self {
+    pub fn new(session: Session, kind: FingertipKind, finger: Finger, passes: &[MeasuredPass]) -> Self {
         let bare: Vec<Pass> = passes.iter().map(|p| p.pass.clone()).collect();
         let mu0 = coulomb_coefficient(&bare).filter(|mu0| *mu0 > 0.0);
         let driven = |p: &MeasuredPass| {

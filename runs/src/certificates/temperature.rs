@@ -68,10 +68,10 @@ impl std::fmt::Display for TemperatureFlag {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use realtime::ports::{Nanos, Quality, Reading};
+    use realtime::ports::{Nanos, Quality, Sample};
 
     fn channel(value: f64) -> Channel {
-        Ok(Reading { value, raw: 0, taken_at: Nanos(0), sequence: 0, quality: Quality::Good })
+        Ok(Sample { value, raw: 0, taken_at: Nanos(0), sequence: 0, quality: Quality::Good })
     }
 
     #[test]

@@ -17,7 +17,7 @@ use std::f64::consts::TAU;
 #[serde(deny_unknown_fields)]
 pub struct RenderPlan {
     /// Kind of the target.
-    pub target: Kind,
+    pub target: TargetKind,
     /// Wanted `mu'` in the middle of a grating or of noise, and at the ends of a ramp's middle.
     #[serde(default = "middle")]
     pub mean: f64,
@@ -63,7 +63,7 @@ pub struct RenderPlan {
 /// Kinds of targets.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize, schemars::JsonSchema)]
 #[serde(rename_all = "snake_case")]
-pub enum Kind {
+pub enum TargetKind {
     /// A sine of `period_m`.
     Grating,
     /// From `mean - depth` to `mean + depth` over the stroke.
@@ -109,9 +109,9 @@ impl RenderPlan {
     /// The shortest wave in m that the plan states; none of a ramp or a table.
     pub fn shortest_m(&self) -> Option<f64> {
         match self.target {
-            Kind::Grating => self.period_m,
-            Kind::Noise => self.waves_m.map(|waves| waves[0]),
-            Kind::Ramp | Kind::Table | Kind::Image => None,
+            TargetKind::Grating => self.period_m,
+            TargetKind::Noise => self.waves_m.map(|waves| waves[0]),
+            TargetKind::Ramp | TargetKind::Table | TargetKind::Image => None,
         }
     }
 
@@ -122,7 +122,7 @@ impl RenderPlan {
             }
         };
         let length = |m: f64| m.is_finite() && (1e-5..=1.0).contains(&m);
-        let generated = self.target != Kind::Table;
+        let generated = self.target != TargetKind::Table;
         let inside = self.mean - self.depth > 0.0 && self.mean + self.depth <= 1.0 && self.depth > 0.0;
         needs("depth", !generated || inside, "mean - depth must be above 0, mean + depth at most 1");
         needs(
@@ -131,19 +131,19 @@ impl RenderPlan {
             "a number between 0 and 1 is needed",
         );
         needs("fall", (-2.0..=4.0).contains(&self.fall), "a number from -2 to 4 is needed");
-        let grating = self.target == Kind::Grating;
+        let grating = self.target == TargetKind::Grating;
         needs(
             "period_m",
             !grating || self.period_m.is_some_and(length),
             "a grating needs a period of 10 \u{b5}m to 1 m",
         );
         let waves = self.waves_m.is_some_and(|[a, b]| length(a) && length(b) && a < b);
-        let noise = self.target == Kind::Noise;
+        let noise = self.target == TargetKind::Noise;
         needs("waves_m", !noise || waves, "noise needs the shortest and the longest wave, 10 \u{b5}m to 1 m");
         let gain = self.integral_per_s.is_none_or(|k| k.is_finite() && k > 0.0);
         needs("integral_per_s", gain, "a number above 0 is needed");
-        let image = self.target == Kind::Image;
-        let filed = !image && self.target != Kind::Table;
+        let image = self.target == TargetKind::Image;
+        let filed = !image && self.target != TargetKind::Table;
         needs(
             "file",
             filed || self.file.is_some(),
@@ -158,11 +158,11 @@ impl RenderPlan {
     fn made(&self, plan: &Plan, span: [f64; 2], mu0: f64) -> miette::Result<Target> {
         let length = span[1] - span[0];
         let waves: Vec<[f64; 3]> = match self.target {
-            Kind::Table => return self.table(plan, mu0),
-            Kind::Image => return self.image(plan, 0.5 * (span[0] + span[1])),
-            Kind::Ramp => Vec::new(),
-            Kind::Grating => vec![[TAU / self.period_m.unwrap_or(length), 1.0, 0.0]],
-            Kind::Noise => {
+            TargetKind::Table => return self.table(plan, mu0),
+            TargetKind::Image => return self.image(plan, 0.5 * (span[0] + span[1])),
+            TargetKind::Ramp => Vec::new(),
+            TargetKind::Grating => vec![[TAU / self.period_m.unwrap_or(length), 1.0, 0.0]],
+            TargetKind::Noise => {
                 let mut rng = ChaCha12Rng::seed_from_u64(self.seed);
                 let [short, long] = self.waves_m.unwrap_or([length; 2]).map(|m| TAU / m);
                 let each = |i: u32| {
@@ -178,12 +178,12 @@ impl RenderPlan {
         let at = |i: usize| {
             let x = span[0] + step_m * i as f64;
             match self.target {
-                Kind::Ramp => 2.0 * (x - span[0]) / length - 1.0,
+                TargetKind::Ramp => 2.0 * (x - span[0]) / length - 1.0,
                 _ => waves.iter().map(|[k, size, phase]| size * (k * x + phase).sin()).sum::<f64>(),
             }
         };
         let mut shape: Vec<f64> = (0..count as usize).map(at).collect();
-        if self.target == Kind::Noise {
+        if self.target == TargetKind::Noise {
             let most = shape.iter().fold(0.0f64, |most, v| most.max(v.abs()));
             shape.iter_mut().for_each(|v| *v /= most);
         }

@@ -4,7 +4,7 @@
 //! that says something else is refused: the harmless one of two statements never wins.
 
 use super::SetupFile;
-use crate::fingertip::{Fingertip, Kind};
+use crate::fingertip::{Fingertip, FingertipKind};
 use crate::input::Problems;
 use drivers::InstrumentSetup;
 use instruments::Profile;
@@ -13,7 +13,7 @@ use std::net::SocketAddr;
 /// Whether a person's finger is on the plate, so that its guards apply. A virtual rig vibrates nobody: there `human_contact` asks
 /// for a rehearsal of the guards.
 pub(super) fn person(file: &SetupFile, tip: Option<&Fingertip>) -> bool {
-    let human = tip.is_some_and(|tip| tip.kind == Kind::Human);
+    let human = tip.is_some_and(|tip| tip.kind == FingertipKind::Human);
     let rehearsed = file.limits.human_contact == Some(true);
     human && !file.finger.nobody_touches_the_plate && (rehearsed || file.virtual_rig.is_none())
 }
@@ -138,7 +138,7 @@ pub(super) fn contradictions(file: &SetupFile, tip: Option<&Fingertip>, wrong: &
 /// The keys that speak of a person, against the fingertip.
 fn who_touches(file: &SetupFile, tip: &Fingertip, wrong: &mut Problems<'_>) {
     let (nobody, contact) = (file.finger.nobody_touches_the_plate, file.limits.human_contact);
-    let human = tip.kind == Kind::Human;
+    let human = tip.kind == FingertipKind::Human;
     let say_nobody = "leave human_contact out; where nobody touches the plate, write nobody_touches_the_plate = true in [finger]";
     let (path, problem, remedy): (&[&str], _, _) = match (human, nobody, contact) {
         (false, true, _) => (

@@ -3,14 +3,14 @@
 
 use super::*;
 
-pub(super) const KIND: Kind = Kind {
+pub(super) const KIND: DefectKind = DefectKind {
     parameters: &[
         Parameter::log("attraction_n", 5e-4, 0.2),
         Parameter::log("development_n", 0.01, 0.1),
         Parameter::linear("speed_exponent", 0.1, 0.4),
     ],
     act: Act::Contact(act),
-    ..Kind::cause(Place::Contact, "attraction adds to the load that friction feels")
+    ..DefectKind::cause(Location::Contact, "attraction adds to the load that friction feels")
 };
 
 const REFERENCE_M_S: f64 = 0.02;

@@ -2,7 +2,7 @@
 
 use super::*;
 
-pub(super) const KIND: Kind = Kind {
+pub(super) const KIND: DefectKind = DefectKind {
     act: Act::Setup(|_, config| config.amplifier.refuses_off = true),
-    ..Kind::fault(Place::Plate, "the amplifier ignores its enable input once its output is on")
+    ..DefectKind::fault(Location::Plate, "the amplifier ignores its enable input once its output is on")
 };

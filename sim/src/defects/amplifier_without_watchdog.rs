@@ -2,7 +2,7 @@
 
 use super::*;
 
-pub(super) const KIND: Kind = Kind {
+pub(super) const KIND: DefectKind = DefectKind {
     act: Act::Setup(|_, config| config.amplifier.watchdog_s = 1e9),
-    ..Kind::fault(Place::Plate, "the amplifier's own watchdog does not act")
+    ..DefectKind::fault(Location::Plate, "the amplifier's own watchdog does not act")
 };

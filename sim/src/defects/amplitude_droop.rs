@@ -5,13 +5,13 @@
 
 use super::*;
 
-pub(super) const KIND: Kind = Kind {
+pub(super) const KIND: DefectKind = DefectKind {
     parameters: &[
         Parameter::log("load_ratio_at_1_n", 0.01, 3.0),
         Parameter::linear("flight_per_um", 0.1, 0.6),
     ],
     act: Act::Plate(act),
-    ..Kind::cause(Place::Plate, "the plate's amplitude droops under the finger's load")
+    ..DefectKind::cause(Location::Plate, "the plate's amplitude droops under the finger's load")
 };
 
 fn act(v: &Values, at: &Surroundings, pp_m: f64) -> f64 {

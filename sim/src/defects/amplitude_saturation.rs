@@ -3,13 +3,13 @@
 
 use super::*;
 
-pub(super) const KIND: Kind = Kind {
+pub(super) const KIND: DefectKind = DefectKind {
     parameters: &[
         Parameter::log("inverse_ceiling_at_25_khz_per_m", 1.2e5, 1.5e6),
         Parameter::linear("frequency_exponent", 0.3, 1.0),
     ],
     act: Act::Plate(act),
-    ..Kind::cause(Place::Plate, "the amplitude stops growing with the set-point")
+    ..DefectKind::cause(Location::Plate, "the amplitude stops growing with the set-point")
 };
 
 fn act(v: &Values, at: &Surroundings, pp_m: f64) -> f64 {

@@ -2,7 +2,7 @@
 
 use super::*;
 
-pub(super) const KIND: Kind = Kind {
+pub(super) const KIND: DefectKind = DefectKind {
     act: Act::Setup(|_, config| config.room.chamber.stuck = true),
-    ..Kind::fault(Place::Instrument, "the chamber takes set-points and leaves the air as it is")
+    ..DefectKind::fault(Location::Instrument, "the chamber takes set-points and leaves the air as it is")
 };

@@ -2,7 +2,7 @@
 
 use super::*;
 
-pub(super) const KIND: Kind = Kind {
+pub(super) const KIND: DefectKind = DefectKind {
     parameters: &[
         Parameter::signed("relative_change", 0.01, 0.8),
         Parameter::linear("centre_m", -0.015, 0.015),
@@ -10,7 +10,7 @@ pub(super) const KIND: Kind = Kind {
     ],
     in_library: false,
     act: Act::Contact(act),
-    ..Kind::cause(Place::Plate, "friction differs on a patch of the plate")
+    ..DefectKind::cause(Location::Plate, "friction differs on a patch of the plate")
 };
 
 fn act(v: &Values, at: &Surroundings, contact: &mut Contact) {

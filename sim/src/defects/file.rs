@@ -6,7 +6,7 @@
 
 use serde::Deserialize;
 
-use super::{Defect, Kind, Values};
+use super::{Defect, DefectKind, Values};
 use crate::channel::ChannelFault;
 use crate::noise::Noise;
 
@@ -72,7 +72,7 @@ impl Defects {
     /// # Errors
     /// An unknown name.
     pub fn sealed(name: &str, seed: u64) -> Result<Self, DefectsError> {
-        let kind = Kind::named(name).ok_or_else(|| unknown(1, name))?;
+        let kind = DefectKind::named(name).ok_or_else(|| unknown(1, name))?;
         Ok(Self { defects: vec![drawn(kind, seed)], channels: Vec::new() })
     }
 
@@ -110,7 +110,7 @@ impl Defects {
         for entry in &file.defect {
             let at = line(entry.name.span().start);
             let name = entry.name.get_ref();
-            let kind = Kind::named(name).ok_or_else(|| unknown(at, name))?;
+            let kind = DefectKind::named(name).ok_or_else(|| unknown(at, name))?;
             let mut defect = drawn(kind, entry.seed.unwrap_or(0));
             let mut given = [false; 4];
             for (parameter, value) in &entry.parameters {
@@ -176,7 +176,7 @@ impl Defects {
     }
 }
 
-fn drawn(kind: &'static Kind, seed: u64) -> Defect {
+fn drawn(kind: &'static DefectKind, seed: u64) -> Defect {
     let values: Values = kind.draw(&mut Noise::new(seed, kind.name));
     Defect { kind, values }
 }

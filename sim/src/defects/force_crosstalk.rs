@@ -3,14 +3,14 @@
 
 use super::*;
 
-pub(super) const KIND: Kind = Kind {
+pub(super) const KIND: DefectKind = DefectKind {
     parameters: &[
         Parameter::signed("lateral_per_normal", 0.0015, 0.15),
         Parameter::linear("normal_per_lateral", 0.0, 0.02),
     ],
     imitated: true,
     act: Act::Forces(act),
-    ..Kind::cause(Place::Instrument, "a share of each force shows in the other channel")
+    ..DefectKind::cause(Location::Instrument, "a share of each force shows in the other channel")
 };
 
 fn act(v: &Values, _: &Surroundings, forces: &mut Forces) {

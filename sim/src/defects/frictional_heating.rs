@@ -3,11 +3,11 @@
 
 use super::*;
 
-pub(super) const KIND: Kind = Kind {
+pub(super) const KIND: DefectKind = DefectKind {
     parameters: &[Parameter::log("inverse_power_per_w", 1.0, 400.0)],
     in_library: false,
     act: Act::Contact(act),
-    ..Kind::cause(Place::Contact, "friction falls with the power that it dissipates")
+    ..DefectKind::cause(Location::Contact, "friction falls with the power that it dissipates")
 };
 
 fn act(v: &Values, _: &Surroundings, contact: &mut Contact) {

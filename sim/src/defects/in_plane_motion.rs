@@ -3,11 +3,11 @@
 
 use super::*;
 
-pub(super) const KIND: Kind = Kind {
+pub(super) const KIND: DefectKind = DefectKind {
     parameters: &[Parameter::log("share", 0.003, 0.5), Parameter::linear("phase_rad", 0.0, 6.2)],
     in_library: false,
     act: Act::Contact(act),
-    ..Kind::cause(Place::Plate, "the plate also vibrates along the sliding direction")
+    ..DefectKind::cause(Location::Plate, "the plate also vibrates along the sliding direction")
 };
 
 fn act(v: &Values, at: &Surroundings, contact: &mut Contact) {

@@ -2,14 +2,14 @@
 
 use super::*;
 
-pub(super) const KIND: Kind = Kind {
+pub(super) const KIND: DefectKind = DefectKind {
     parameters: &[
         Parameter::signed("end_n", 4e-4, 0.04),
         Parameter::linear("start_over_end", -1.0, 1.0),
         Parameter::log("time_s", 40.0, 600.0),
     ],
     act: Act::Forces(act),
-    ..Kind::cause(Place::Instrument, "the zero of the lateral force is off and drifts")
+    ..DefectKind::cause(Location::Instrument, "the zero of the lateral force is off and drifts")
 };
 
 fn act(v: &Values, at: &Surroundings, forces: &mut Forces) {

@@ -4,10 +4,10 @@
 
 use super::*;
 
-pub(super) const KIND: Kind = Kind {
+pub(super) const KIND: DefectKind = DefectKind {
     parameters: &[Parameter::log("slowness_s_per_m", 10.0, 1000.0), Parameter::log("knee_m", 3e-8, 3e-7)],
     act: Act::Contact(act),
-    ..Kind::cause(Place::Contact, "ridges recover their lateral stretch at a finite speed")
+    ..DefectKind::cause(Location::Contact, "ridges recover their lateral stretch at a finite speed")
 };
 
 fn act(v: &Values, _: &Surroundings, contact: &mut Contact) {

@@ -2,12 +2,12 @@
 
 use super::*;
 
-pub(super) const KIND: Kind = Kind {
+pub(super) const KIND: DefectKind = DefectKind {
     parameters: &[Parameter::log("strength", 0.02, 1.0), Parameter::log("resonance_hz", 3e4, 5e4)],
     in_library: false,
     act: Act::Contact(act),
-    ..Kind::cause(
-        Place::Finger,
+    ..DefectKind::cause(
+        Location::Finger,
         "the lateral stiffness of the ridges depends on frequency as a resonance does",
     )
 };

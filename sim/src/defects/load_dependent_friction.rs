@@ -4,10 +4,10 @@
 
 use super::*;
 
-pub(super) const KIND: Kind = Kind {
+pub(super) const KIND: DefectKind = DefectKind {
     parameters: &[Parameter::log("area_share", 0.01, 0.95)],
     act: Act::Contact(act),
-    ..Kind::cause(Place::Contact, "part of the friction limit grows as the 2/3 power of the force")
+    ..DefectKind::cause(Location::Contact, "part of the friction limit grows as the 2/3 power of the force")
 };
 
 /// Force at which the share leaves the friction as it was (N).

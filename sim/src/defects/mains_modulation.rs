@@ -3,11 +3,11 @@
 
 use super::*;
 
-pub(super) const KIND: Kind = Kind {
+pub(super) const KIND: DefectKind = DefectKind {
     parameters: &[Parameter::log("depth", 0.05, 0.95), Parameter::log("corner_m", 6e-6, 3e-5)],
     in_library: false,
     act: Act::Contact(act),
-    ..Kind::cause(Place::Plate, "the amplitude is modulated at twice the mains frequency")
+    ..DefectKind::cause(Location::Plate, "the amplitude is modulated at twice the mains frequency")
 };
 
 fn act(v: &Values, _: &Surroundings, contact: &mut Contact) {

@@ -4,7 +4,7 @@
 
 use super::*;
 
-pub(super) const KIND: Kind = Kind {
+pub(super) const KIND: DefectKind = DefectKind {
     parameters: &[
         Parameter::log("depth", 0.01, 0.95),
         Parameter::linear("phase_rad", 0.0, 3.1),
@@ -12,7 +12,7 @@ pub(super) const KIND: Kind = Kind {
         Parameter::linear("edge_over_wave", 0.1, 0.4),
     ],
     act: Act::Plate(act),
-    ..Kind::cause(Place::Plate, "the amplitude depends on the position along the plate")
+    ..DefectKind::cause(Location::Plate, "the amplitude depends on the position along the plate")
 };
 
 /// Distance of the driven edge from the middle of the stroke (m).

@@ -3,14 +3,14 @@
 
 use super::*;
 
-pub(super) const KIND: Kind = Kind {
+pub(super) const KIND: DefectKind = DefectKind {
     parameters: &[
         Parameter::signed("relative_gain", 0.006, 0.8),
         Parameter::log("half_time_s", 15.0, 400.0),
         Parameter::linear("softening", 0.0, 0.15),
     ],
     act: Act::Contact(act),
-    ..Kind::cause(Place::Contact, "friction and softness change with the time in contact")
+    ..DefectKind::cause(Location::Contact, "friction and softness change with the time in contact")
 };
 
 fn act(v: &Values, at: &Surroundings, contact: &mut Contact) {

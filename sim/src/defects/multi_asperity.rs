@@ -3,8 +3,8 @@
 
 use super::*;
 
-pub(super) const KIND: Kind = Kind {
+pub(super) const KIND: DefectKind = DefectKind {
     parameters: &[Parameter::log("height_sd_m", 5e-9, 1.5e-6)],
     act: Act::Contact(|v, _, contact| contact.ridge.height_sd_m = v[0]),
-    ..Kind::cause(Place::Contact, "ridges of unequal height leave the plate one after another")
+    ..DefectKind::cause(Location::Contact, "ridges of unequal height leave the plate one after another")
 };

@@ -5,10 +5,10 @@
 
 use super::*;
 
-pub(super) const KIND: Kind = Kind {
+pub(super) const KIND: DefectKind = DefectKind {
     parameters: &[Parameter::log("retardation_s", 3e-8, 1e-5)],
     act: Act::Contact(act),
-    ..Kind::cause(Place::Contact, "ridges are damped on their normal spring")
+    ..DefectKind::cause(Location::Contact, "ridges are damped on their normal spring")
 };
 
 fn act(v: &Values, _: &Surroundings, contact: &mut Contact) {

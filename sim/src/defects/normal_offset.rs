@@ -3,10 +3,10 @@
 
 use super::*;
 
-pub(super) const KIND: Kind = Kind {
+pub(super) const KIND: DefectKind = DefectKind {
     parameters: &[Parameter::signed("offset_n", 1.5e-3, 0.12), Parameter::linear("sinking", 0.1, 0.5)],
     act: Act::Forces(act),
-    ..Kind::cause(Place::Instrument, "the zero of the normal force is off")
+    ..DefectKind::cause(Location::Instrument, "the zero of the normal force is off")
 };
 
 fn act(v: &Values, at: &Surroundings, forces: &mut Forces) {

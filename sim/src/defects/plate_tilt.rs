@@ -2,14 +2,14 @@
 
 use super::*;
 
-pub(super) const KIND: Kind = Kind {
+pub(super) const KIND: DefectKind = DefectKind {
     parameters: &[
         Parameter::signed("tilt_rad", 0.0015, 0.12),
         Parameter::linear("bend_over_tilt", -0.6, 0.6),
     ],
     imitated: true,
     act: Act::Forces(act),
-    ..Kind::cause(Place::Instrument, "the plate is tilted against the sensor")
+    ..DefectKind::cause(Location::Instrument, "the plate is tilted against the sensor")
 };
 
 /// Distance from the middle at which the bend is stated (m).

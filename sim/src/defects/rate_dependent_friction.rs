@@ -5,14 +5,14 @@
 
 use super::*;
 
-pub(super) const KIND: Kind = Kind {
+pub(super) const KIND: DefectKind = DefectKind {
     parameters: &[
         Parameter::signed("relative_slope", 0.004, 0.3),
         Parameter::log("knee_m_s", 2e-3, 2e-2),
         Parameter::linear("fall_per_50_mm_s", 0.0, 0.8),
     ],
     act: Act::Contact(act),
-    ..Kind::cause(Place::Contact, "the coefficient of friction depends on the sliding speed")
+    ..DefectKind::cause(Location::Contact, "the coefficient of friction depends on the sliding speed")
 };
 
 const REFERENCE_M_S: f64 = 0.02;

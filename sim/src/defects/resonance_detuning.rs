@@ -4,7 +4,7 @@
 
 use super::*;
 
-pub(super) const KIND: Kind = Kind {
+pub(super) const KIND: DefectKind = DefectKind {
     parameters: &[
         Parameter::log("relative_shift_per_k", 1e-5, 4e-3),
         Parameter::linear("softening_per_um2", 0.0, 2e-4),
@@ -12,7 +12,7 @@ pub(super) const KIND: Kind = Kind {
         Parameter::linear("raised_k_per_n", 1.0, 5.0),
     ],
     act: Act::Plate(act),
-    ..Kind::cause(Place::Plate, "the plate is driven off its resonance as it warms")
+    ..DefectKind::cause(Location::Plate, "the plate is driven off its resonance as it warms")
 };
 
 const QUALITY: f64 = 150.0;

@@ -5,14 +5,14 @@
 
 use super::*;
 
-pub(super) const KIND: Kind = Kind {
+pub(super) const KIND: DefectKind = DefectKind {
     parameters: &[
         Parameter::log("mass_kg", 1e-7, 8e-6),
         Parameter::log("damping_ratio", 0.3, 1.0),
         Parameter::log("skin_loss", 0.15, 0.6),
     ],
     act: Act::Contact(act),
-    ..Kind::cause(Place::Contact, "ridges have mass: they overshoot, fly and land")
+    ..DefectKind::cause(Location::Contact, "ridges have mass: they overshoot, fly and land")
 };
 
 fn act(v: &Values, _: &Surroundings, contact: &mut Contact) {

@@ -3,11 +3,11 @@
 
 use super::*;
 
-pub(super) const KIND: Kind = Kind {
+pub(super) const KIND: DefectKind = DefectKind {
     parameters: &[Parameter::log("ratio_at_2_um", 0.01, 0.6), Parameter::linear("phase_rad", 0.0, 6.2)],
     in_library: false,
     act: Act::Contact(act),
-    ..Kind::cause(Place::Plate, "the plate also vibrates at twice the frequency")
+    ..DefectKind::cause(Location::Plate, "the plate also vibrates at twice the frequency")
 };
 
 fn act(v: &Values, _: &Surroundings, contact: &mut Contact) {

@@ -2,9 +2,9 @@
 
 use super::*;
 
-pub(super) const KIND: Kind = Kind {
+pub(super) const KIND: DefectKind = DefectKind {
     parameters: &[Parameter::log("bandwidth_hz", 2.0, 80.0)],
     in_tables: false,
     act: Act::Setup(|v, config| config.sensor.bandwidth_hz = v[0]),
-    ..Kind::cause(Place::Instrument, "the bandwidth of the force sensor is lower than stated")
+    ..DefectKind::cause(Location::Instrument, "the bandwidth of the force sensor is lower than stated")
 };

@@ -2,11 +2,11 @@
 
 use super::*;
 
-pub(super) const KIND: Kind = Kind {
+pub(super) const KIND: DefectKind = DefectKind {
     parameters: &[Parameter::factor("factor", 0.02, 0.8)],
     imitated: true,
     act: Act::Contact(act),
-    ..Kind::cause(Place::Instrument, "the true sliding speed is not the one stated")
+    ..DefectKind::cause(Location::Instrument, "the true sliding speed is not the one stated")
 };
 
 fn act(v: &Values, _: &Surroundings, contact: &mut Contact) {

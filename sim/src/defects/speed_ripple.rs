@@ -2,14 +2,14 @@
 
 use super::*;
 
-pub(super) const KIND: Kind = Kind {
+pub(super) const KIND: DefectKind = DefectKind {
     parameters: &[
         Parameter::log("ripple", 0.01, 0.7),
         Parameter::log("pitch_m", 3e-3, 1.2e-2),
         Parameter::linear("phase_rad", 0.0, 6.2),
     ],
     act: Act::Contact(act),
-    ..Kind::cause(Place::Instrument, "the speed rises and falls along the stroke")
+    ..DefectKind::cause(Location::Instrument, "the speed rises and falls along the stroke")
 };
 
 fn act(v: &Values, at: &Surroundings, contact: &mut Contact) {

@@ -7,14 +7,14 @@
 
 use super::*;
 
-pub(super) const KIND: Kind = Kind {
+pub(super) const KIND: DefectKind = DefectKind {
     parameters: &[
         Parameter::log("film_area_m2", 3e-8, 1.5e-5),
         Parameter::log("half_gap_m", 2e-6, 3.5e-6),
         Parameter::log("asperity_load_n", 0.5, 3.0),
     ],
     act: Act::Contact(act),
-    ..Kind::cause(Place::Contact, "air trapped between ridges and plate carries part of the load")
+    ..DefectKind::cause(Location::Contact, "air trapped between ridges and plate carries part of the load")
 };
 
 /// Mean free path of air at one atmosphere (m).

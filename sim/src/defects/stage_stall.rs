@@ -2,8 +2,8 @@
 
 use super::*;
 
-pub(super) const KIND: Kind = Kind {
+pub(super) const KIND: DefectKind = DefectKind {
     parameters: &[Parameter::log("from_s", 0.5, 30.0)],
     act: Act::Setup(|v, config| config.stage.stalls_at_s = v[0]),
-    ..Kind::fault(Place::Instrument, "the stage's slide stands still from a time on")
+    ..DefectKind::fault(Location::Instrument, "the stage's slide stands still from a time on")
 };

@@ -4,11 +4,11 @@
 
 use super::*;
 
-pub(super) const KIND: Kind = Kind {
+pub(super) const KIND: DefectKind = DefectKind {
     parameters: &[Parameter::factor("factor", 0.04, 1.8), Parameter::linear("angle_rad", -0.46, 2.0)],
     imitated: true,
     act: Act::Contact(act),
-    ..Kind::cause(Place::Finger, "the true stiffnesses are far from the nominal ones")
+    ..DefectKind::cause(Location::Finger, "the true stiffnesses are far from the nominal ones")
 };
 
 fn act(v: &Values, _: &Surroundings, contact: &mut Contact) {

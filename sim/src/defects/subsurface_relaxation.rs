@@ -3,14 +3,14 @@
 
 use super::*;
 
-pub(super) const KIND: Kind = Kind {
+pub(super) const KIND: DefectKind = DefectKind {
     parameters: &[
         Parameter::log("creep", 0.01, 1.0),
         Parameter::log("time_s", 1.0, 30.0),
         Parameter::linear("lateral_over_normal", 0.2, 1.5),
     ],
     act: Act::Contact(act),
-    ..Kind::cause(Place::Contact, "the tissue under the ridges creeps with the time in contact")
+    ..DefectKind::cause(Location::Contact, "the tissue under the ridges creeps with the time in contact")
 };
 
 fn act(v: &Values, at: &Surroundings, contact: &mut Contact) {

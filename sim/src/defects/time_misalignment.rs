@@ -2,12 +2,12 @@
 
 use super::*;
 
-pub(super) const KIND: Kind = Kind {
+pub(super) const KIND: DefectKind = DefectKind {
     parameters: &[Parameter::log("delay_s", 2e-3, 0.1)],
     in_tables: false,
     act: Act::Setup(|v, config| {
         config.sensor.latency_s += v[0];
         config.sensor.unstated_latency_s += v[0];
     }),
-    ..Kind::cause(Place::Instrument, "forces arrive later than stated")
+    ..DefectKind::cause(Location::Instrument, "forces arrive later than stated")
 };

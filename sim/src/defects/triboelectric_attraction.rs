@@ -2,11 +2,11 @@
 
 use super::*;
 
-pub(super) const KIND: Kind = Kind {
+pub(super) const KIND: DefectKind = DefectKind {
     parameters: &[Parameter::log("attraction_n", 1e-3, 0.15), Parameter::log("speed_m_s", 5e-3, 5e-2)],
     in_library: false,
     act: Act::Contact(act),
-    ..Kind::cause(Place::Contact, "sliding charges the plate, and the charge attracts the finger")
+    ..DefectKind::cause(Location::Contact, "sliding charges the plate, and the charge attracts the finger")
 };
 
 fn act(v: &Values, _: &Surroundings, contact: &mut Contact) {

@@ -7,7 +7,7 @@ use serde::{Deserialize, Serialize};
 
 use super::design::Planned;
 use super::oracle::Case;
-use crate::defects::{Defect, Defects, Kind, Surroundings};
+use crate::defects::{Defect, DefectKind, Defects, Surroundings};
 use crate::finger::{Finger, FingerConfig};
 use crate::noise::Noise;
 use crate::world::{Point, steady_forces};
@@ -149,7 +149,7 @@ impl Bench {
     /// Causes, each with a size whose recalibrated gap, in deviations of a pass, comes nearest to one drawn from a range.
     pub(super) fn sized(
         &self,
-        kinds: &[&'static Kind],
+        kinds: &[&'static DefectKind],
         points: &[Point],
         gap: [f64; 2],
         noise: &mut Noise,

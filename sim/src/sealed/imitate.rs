@@ -9,7 +9,7 @@ use serde::{Deserialize, Serialize};
 
 use super::form::{Kernel, solved};
 use super::oracle::{Case, Fit, NUISANCES, moved};
-use crate::defects::{ALL, Defect, Defects, Draw, Kind, Parameter, Values, compatible};
+use crate::defects::{ALL, Defect, DefectKind, Defects, Draw, Parameter, Values, compatible};
 use crate::noise::Noise;
 
 /// Causes whose ridges fly or recover late: marched through many cycles, hundred times as dear as the others.
@@ -86,11 +86,11 @@ fn lowest(p: &Parameter) -> f64 {
     if matches!(p.draw, Draw::Signed | Draw::Factor) { -1.0 } else { 0.0 }
 }
 
-fn with(kind: &'static Kind, values: Values) -> Defects {
+fn with(kind: &'static DefectKind, values: Values) -> Defects {
     Defects { defects: vec![Defect { kind, values }], channels: Vec::new() }
 }
 
-fn values_of(kind: &Kind, x: &[f64; UNKNOWNS]) -> Values {
+fn values_of(kind: &DefectKind, x: &[f64; UNKNOWNS]) -> Values {
     let mut values = Values::default();
     for (i, p) in kind.parameters.iter().enumerate() {
         values[i] = value(p, x[NUISANCES + i]);
@@ -121,10 +121,10 @@ impl Case<'_> {
         let gap = (base.chi2 - truth_chi2).max(1e-9);
         let thinned_gap = thinned_base.chi2 - truth_chi2;
         let near = NEAR + SOUGHT * gap;
-        let dear = |kind: &Kind| DEAR.contains(&kind.name);
+        let dear = |kind: &DefectKind| DEAR.contains(&kind.name);
         let among_dear = truth.iter().chain(self.beside).any(|d| dear(d.kind));
         let kernel = std::cell::OnceCell::new();
-        let one = |kind: &'static Kind| {
+        let one = |kind: &'static DefectKind| {
             let mut state = if dear(kind) && !whole && thinned_gap > LIKE * gap {
                 let worth = if among_dear { WORTH } else { WORTH_DEAR };
                 let tried = thinned.imitate(kind, &thinned_base, truth_chi2, near, worth);
@@ -196,7 +196,7 @@ impl Case<'_> {
 
     /// The rungs of each draw's ladder that leave least, best first: chi2 with the nuisances refitted to
     /// first order, and the parameters.
-    fn ladder(&self, kind: &'static Kind, base: &Fit) -> Vec<(f64, Values)> {
+    fn ladder(&self, kind: &'static DefectKind, base: &Fit) -> Vec<(f64, Values)> {
         let sides = if matches!(kind.parameters[0].draw, Draw::Log | Draw::Linear) { 1 } else { 2 };
         // Every side of the size with the first shape over its range.
         let (shapes, rungs) = match kind.parameters.len() > 1 {
@@ -229,7 +229,14 @@ impl Case<'_> {
     }
 
     /// A cause's best imitation from the two best draws of its ladder.
-    fn imitate(&self, kind: &'static Kind, base: &Fit, truth_chi2: f64, near: f64, worth: f64) -> State {
+    fn imitate(
+        &self,
+        kind: &'static DefectKind,
+        base: &Fit,
+        truth_chi2: f64,
+        near: f64,
+        worth: f64,
+    ) -> State {
         let mut best: Option<State> = None;
         let ladder = self.ladder(kind, base);
         let first = ladder[0].0;
@@ -261,7 +268,7 @@ impl Case<'_> {
     }
 
     /// Levenberg-Marquardt within the bounds of the kind's own ranges.
-    fn search(&self, kind: &'static Kind, start: State, truth_chi2: f64, near: f64) -> State {
+    fn search(&self, kind: &'static DefectKind, start: State, truth_chi2: f64, near: f64) -> State {
         let n = NUISANCES + kind.parameters.len();
         let run = |x: &[f64; UNKNOWNS]| self.run(kind, x);
         let mut at = start;
@@ -292,12 +299,12 @@ impl Case<'_> {
         at
     }
 
-    fn run(&self, kind: &'static Kind, x: &[f64; UNKNOWNS]) -> Vec<f64> {
+    fn run(&self, kind: &'static DefectKind, x: &[f64; UNKNOWNS]) -> Vec<f64> {
         self.predict(&moved(&self.nominal, theta(x)), &with(kind, values_of(kind, x)))
     }
 
     /// Derivatives of the model in standard deviations.
-    fn columns(&self, kind: &'static Kind, at: &[f64; UNKNOWNS], model: &[f64]) -> Vec<Vec<f64>> {
+    fn columns(&self, kind: &'static DefectKind, at: &[f64; UNKNOWNS], model: &[f64]) -> Vec<Vec<f64>> {
         let one = |k: usize| {
             let mut x = *at;
             let h = if k < NUISANCES || x[k] < 0.5 { 2e-3 } else { -2e-3 };
@@ -310,7 +317,13 @@ impl Case<'_> {
 
     /// Cost of an imitation that may depart from its form, from the optimum without departures: where the
     /// departure takes up what is smooth, another size may do better.
-    fn form_cost(&self, kind: &'static Kind, start: [f64; UNKNOWNS], kernel: &Kernel, base: &Fit) -> f64 {
+    fn form_cost(
+        &self,
+        kind: &'static DefectKind,
+        start: [f64; UNKNOWNS],
+        kernel: &Kernel,
+        base: &Fit,
+    ) -> f64 {
         let mut x = start;
         let mut model = self.run(kind, &x);
         let mut now = self.departure(kernel, &model, self.prior(theta(&x)), base);
@@ -359,7 +372,7 @@ impl Case<'_> {
 /// The damped step, nuisances held within a factor, parameters within their ranges: those that a step would
 /// carry out stay at the bound and the others follow.
 fn bounded_step(
-    kind: &Kind,
+    kind: &DefectKind,
     a: &[[f64; UNKNOWNS]; UNKNOWNS],
     b: &[f64; UNKNOWNS],
     damping: f64,
@@ -453,7 +466,7 @@ mod tests {
             let planned = design.plan(&mut noise);
             let bench = Bench::draw(&mut noise, seed);
             let points = bench.circumstances(&planned, true, &mut noise);
-            let truth = Kind::named(name).unwrap();
+            let truth = DefectKind::named(name).unwrap();
             let mut values = truth.draw(&mut noise);
             truth.resize(&mut values, 0.7);
             let data = bench.noise_free(&points, &with(truth, values));
@@ -461,7 +474,7 @@ mod tests {
             let base = case.fit(&Defects::none(), 8);
             let found = case.imitators(&[Defect { kind: truth, values }], &base, 0.0, false);
             for imitator in found.iter().filter(|i| !DEAR.contains(&i.name.as_str())) {
-                let kind = Kind::named(&imitator.name).unwrap();
+                let kind = DefectKind::named(&imitator.name).unwrap();
                 // The best rung with its nuisances refitted in full: the result of a ladder alone.
                 let rung = case.fit(&with(kind, case.ladder(kind, &base)[0].1), 3).chi2.min(base.chi2);
                 // Where not even that mends a quarter of the gap no search follows, and the rung counts to first order.

@@ -4,7 +4,7 @@
 //! The baseline here is this world's own ideal contact. Recalibration means: stiffnesses and mu0 refitted,
 //! the stiffnesses under their stated scatter, by Gauss-Newton steps on their logarithms.
 
-use crate::defects::{Defect, Defects, Kind, compatible};
+use crate::defects::{Defect, DefectKind, Defects, compatible};
 use crate::finger::Finger;
 use crate::world::{Point, steady_forces};
 
@@ -187,7 +187,7 @@ impl Case<'_> {
 }
 
 /// Whether a list of kinds can act together in this world.
-pub(super) fn all_compatible(kinds: &[&'static Kind]) -> bool {
+pub(super) fn all_compatible(kinds: &[&'static DefectKind]) -> bool {
     kinds.iter().enumerate().all(|(i, a)| kinds[..i].iter().all(|b| compatible(a, b)))
 }
 

@@ -5,7 +5,7 @@ use serde::{Deserialize, Serialize};
 
 use super::bench::Bench;
 use super::design::{Design, Planned};
-use crate::defects::{Defects, Kind};
+use crate::defects::{DefectKind, Defects};
 use crate::noise::Noise;
 use models::pass::Pass;
 
@@ -62,7 +62,7 @@ const UNDERSTATED: f64 = 1.5;
 const BAD_SD: [f64; 2] = [8.0, 30.0];
 
 /// The set of a seed: one cause, or none. Sets of one seed and cause differ in their scatter alone.
-pub fn rough(seed: u64, kind: Option<&'static Kind>, roughness: Roughness) -> RoughSet {
+pub fn rough(seed: u64, kind: Option<&'static DefectKind>, roughness: Roughness) -> RoughSet {
     let mut noise = Noise::new(seed, "rough");
     let design = Design {
         runs: RUNS,

@@ -3,7 +3,7 @@
 //! Lines that `muprime cases` writes are padded to one length, which the header states: the millionth case is
 //! then found without reading those before it. A file from elsewhere need not be.
 
-use super::kinds::Kind;
+use super::kinds::CaseKind;
 use miette::{Context, IntoDiagnostic};
 use serde::{Deserialize, Serialize};
 use serde_json::Value;
@@ -47,7 +47,7 @@ impl Header {
     ///
     /// # Errors
     /// Settings that JSON cannot hold.
-    pub fn of(kind: &Kind, settings: &impl Serialize, cases: u64) -> miette::Result<Header> {
+    pub fn of(kind: &CaseKind, settings: &impl Serialize, cases: u64) -> miette::Result<Header> {
         Ok(Header {
             schema: SCHEMA.into(),
             kind: kind.name.into(),

@@ -15,7 +15,7 @@ use sha2::{Digest, Sha256};
 use std::path::Path;
 
 /// All kinds.
-pub const KINDS: [&Kind; 7] =
+pub const KINDS: [&CaseKind; 7] =
     [&ridge::KIND, &table::KIND, &faults::KIND, &blind::KIND, &diagnose::KIND, &finger::KIND, &noop::KIND];
 
 /// What a cell of a result holds.
@@ -115,7 +115,7 @@ pub struct Case {
 pub type Make = Box<dyn Fn(u64, Option<&Value>) -> miette::Result<Case> + Send + Sync>;
 
 /// A kind of case.
-pub struct Kind {
+pub struct CaseKind {
     /// Name in the header of a file of cases.
     pub name: &'static str,
     /// What it is.
@@ -128,7 +128,7 @@ pub struct Kind {
     pub prepare: fn(&Header, &Path) -> miette::Result<Make>,
 }
 
-impl Kind {
+impl CaseKind {
     /// Version of the program and of the model: part of every key.
     pub fn version(&self) -> String {
         format!("muprime {}, {} {}", env!("CARGO_PKG_VERSION"), self.name, self.model)
@@ -148,7 +148,7 @@ impl Kind {
 ///
 /// # Errors
 /// There is none.
-pub fn by_name(name: &str) -> miette::Result<&'static Kind> {
+pub fn by_name(name: &str) -> miette::Result<&'static CaseKind> {
     KINDS.into_iter().find(|k| k.name == name).ok_or_else(|| {
         let names: Vec<&str> = KINDS.iter().map(|k| k.name).collect();
         miette::miette!("no kind of case '{name}': there are {}", names.join(", "))

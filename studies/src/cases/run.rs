@@ -2,7 +2,7 @@
 //! cases: the worker writes what it gives, [`here`] reads it at once.
 
 use super::file::Header;
-use super::kinds::{Case, Cell, Kind, Outcome};
+use super::kinds::{Case, CaseKind, Cell, Outcome};
 use rayon::prelude::*;
 use serde::Serialize;
 use serde_json::Value;
@@ -24,7 +24,7 @@ pub struct Entry {
 pub const PORTION: usize = 4096;
 
 /// Runs one case. A fault of the program in one case is that case's reason: the others stand.
-pub fn entry(kind: &Kind, index: u64, case: Case) -> Entry {
+pub fn entry(kind: &CaseKind, index: u64, case: Case) -> Entry {
     let key = kind.key(&case.inputs);
     let ran = catch_unwind(AssertUnwindSafe(case.run));
     let outcome: Outcome = ran.unwrap_or_else(|panic| {
@@ -40,7 +40,7 @@ pub fn entry(kind: &Kind, index: u64, case: Case) -> Entry {
 /// # Errors
 /// A case that cannot be made, or whatever `take` says.
 pub fn portions(
-    kind: &Kind,
+    kind: &CaseKind,
     mut cases: impl Iterator<Item = miette::Result<(u64, Case)>>,
     cancelled: &dyn Fn() -> bool,
     take: &mut dyn FnMut(Entry) -> miette::Result<()>,
@@ -64,7 +64,7 @@ pub fn portions(
 /// # Errors
 /// Settings that the kind refuses, a case without a result, or whatever `take` says.
 pub fn here(
-    kind: &'static Kind,
+    kind: &'static CaseKind,
     settings: &impl Serialize,
     cases: u64,
     take: &mut dyn FnMut(Vec<Cell>) -> miette::Result<()>,

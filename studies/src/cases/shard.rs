@@ -1,7 +1,7 @@
 //! Results in Parquet: `index`, `key` (SHA-256), `failed` (why there is no result), then the columns of the kind. The file's own
 //! metadata say of which study it is, and who made it; what is gathered holds the first and not the second.
 
-use super::kinds::{Cell, Kind, Type};
+use super::kinds::{CaseKind, Cell, Type};
 use super::run::Entry;
 use arrow_array::builder::{
     BooleanBuilder, FixedSizeBinaryBuilder, Float64Builder, StringBuilder, UInt64Builder,
@@ -30,7 +30,7 @@ pub const ROWS: usize = super::run::PORTION;
 pub type Facts = BTreeMap<String, String>;
 
 /// The schema of a kind's results.
-pub fn schema(kind: &Kind) -> Arc<Schema> {
+pub fn schema(kind: &CaseKind) -> Arc<Schema> {
     let description = |words: &str| HashMap::from([("description".to_string(), words.to_string())]);
     let mut fields = vec![
         Field::new("index", DataType::UInt64, false)
@@ -54,7 +54,7 @@ pub fn schema(kind: &Kind) -> Arc<Schema> {
     Arc::new(Schema::new(fields))
 }
 
-fn batch(kind: &Kind, schema: &Arc<Schema>, entries: &[Entry]) -> miette::Result<RecordBatch> {
+fn batch(kind: &CaseKind, schema: &Arc<Schema>, entries: &[Entry]) -> miette::Result<RecordBatch> {
     let (mut index, mut failed) = (UInt64Builder::new(), StringBuilder::new());
     let mut key = FixedSizeBinaryBuilder::new(32);
     for entry in entries {
@@ -93,7 +93,7 @@ fn batch(kind: &Kind, schema: &Arc<Schema>, entries: &[Entry]) -> miette::Result
     RecordBatch::try_new(Arc::clone(schema), arrays).into_diagnostic()
 }
 
-fn entries(kind: &Kind, batch: &RecordBatch) -> Vec<Entry> {
+fn entries(kind: &CaseKind, batch: &RecordBatch) -> Vec<Entry> {
     let (index, key) = (batch.column(0).as_primitive::<UInt64Type>(), batch.column(1).as_fixed_size_binary());
     let failed = batch.column(2).as_string::<i32>();
     let cell = |i: usize, row: usize| {
@@ -123,7 +123,7 @@ fn entries(kind: &Kind, batch: &RecordBatch) -> Vec<Entry> {
 
 /// Writes results in row groups of [`ROWS`], whatever the portions that they come in.
 pub struct Writer<W: Write + Send> {
-    kind: &'static Kind,
+    kind: &'static CaseKind,
     schema: Arc<Schema>,
     writer: ArrowWriter<W>,
     held: Vec<Entry>,
@@ -134,7 +134,7 @@ impl<W: Write + Send> Writer<W> {
     ///
     /// # Errors
     /// As the file system.
-    pub fn new(kind: &'static Kind, to: W) -> miette::Result<Self> {
+    pub fn new(kind: &'static CaseKind, to: W) -> miette::Result<Self> {
         let schema = schema(kind);
         let properties = WriterProperties::builder()
             .set_compression(Compression::SNAPPY)
@@ -185,7 +185,7 @@ pub struct Reader {
     pub facts: Facts,
     /// Rows that its end states.
     pub rows: u64,
-    kind: &'static Kind,
+    kind: &'static CaseKind,
     batches: ParquetRecordBatchReader,
     ready: std::vec::IntoIter<Entry>,
     shown: String,
@@ -196,7 +196,7 @@ impl Reader {
     ///
     /// # Errors
     /// A file that cannot be read, that is no whole Parquet file, or that holds other columns.
-    pub fn open(kind: &'static Kind, path: &Path) -> miette::Result<Reader> {
+    pub fn open(kind: &'static CaseKind, path: &Path) -> miette::Result<Reader> {
         let shown = path.display().to_string();
         let file = File::open(path).into_diagnostic().wrap_err_with(|| shown.clone())?;
         let builder = ParquetRecordBatchReaderBuilder::try_new(file)
@@ -240,7 +240,7 @@ mod tests {
     use super::*;
     use crate::cases::kinds::{KINDS, ridge};
 
-    fn rows(kind: &Kind, n: u64) -> Vec<Entry> {
+    fn rows(kind: &CaseKind, n: u64) -> Vec<Entry> {
         let cell = |t: Type, i: u64| match (t, i % 3) {
             (_, 2) => Cell::Missing,
             (Type::Number, _) => Cell::Number(1.0 / (1.0 + i as f64)),

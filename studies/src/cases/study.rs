@@ -3,7 +3,7 @@
 
 use super::crash_points;
 use super::file::CaseFile;
-use super::kinds::{self, Case, Kind, Make};
+use super::kinds::{self, Case, CaseKind, Make};
 use miette::{Context, IntoDiagnostic};
 use serde::{Deserialize, Serialize};
 use serde_json::Value;
@@ -37,7 +37,7 @@ pub struct Study {
     /// The cases.
     pub file: CaseFile,
     /// What they are.
-    pub kind: &'static Kind,
+    pub kind: &'static CaseKind,
     /// Folder of the results, absolute.
     pub out: PathBuf,
     make: Make,

@@ -2,7 +2,7 @@
 
 use super::grid::{Cell, Grid};
 use super::map::Taken;
-use super::targets::{Id, Kind, TARGETS, plain};
+use super::targets::{ColumnKind, Id, TARGETS, plain};
 use super::units::{Dimension, Unit};
 
 /// The numbers of a column as they are written.
@@ -39,7 +39,7 @@ pub fn guess(grid: &Grid) -> Vec<Taken> {
             t => t,
         };
         let dimension = match TARGETS[target].kind {
-            Kind::Number(dimension) => Some(dimension),
+            ColumnKind::Number(dimension) => Some(dimension),
             _ => None,
         };
         let stated = unit.is_some();
@@ -146,7 +146,7 @@ fn named(header: &str, row_of_units: Option<&str>) -> Option<(usize, Option<(Str
     };
     let with_unit = |name: &str, text: &str| {
         let at = find(name)?;
-        let Kind::Number(dimension) = TARGETS[at].kind else { return None };
+        let ColumnKind::Number(dimension) = TARGETS[at].kind else { return None };
         Some((at, Some(Unit::guess(dimension, text)?)))
     };
     for (open, close) in [('[', ']'), ('(', ')')] {
@@ -177,7 +177,7 @@ fn named(header: &str, row_of_units: Option<&str>) -> Option<(usize, Option<(Str
     }
     let at = find(header)?;
     // A unit that is none of this quantity says that the column is something else, or needs more than a name.
-    if row_of_units.is_some() && matches!(TARGETS[at].kind, Kind::Number(_)) {
+    if row_of_units.is_some() && matches!(TARGETS[at].kind, ColumnKind::Number(_)) {
         return None;
     }
     // Force or frequency, amplitude or amplifier: only a unit tells.

@@ -1,7 +1,7 @@
 //! Which column of the source is what: stated by `--map` and `--set`, or guessed from the headers.
 
 use super::grid::{Block, Grid};
-use super::targets::{Id, Kind, TARGETS, Target};
+use super::targets::{ColumnKind, Id, TARGETS, Target};
 use super::units::{Dimension, Unit};
 
 /// What is wrong with an entry of `--map` or `--set`, or with the map under a second header (in row `row`).
@@ -222,7 +222,7 @@ fn target_of(text: &str) -> Result<(usize, Unit, String), MapError> {
     let own = || name.to_string();
     let at = Target::named(name).ok_or_else(|| MapError::Target(own()))?;
     let target = &TARGETS[at];
-    let Kind::Number(dimension) = target.kind else {
+    let ColumnKind::Number(dimension) = target.kind else {
         return match unit_text {
             Some(unit) => Err(MapError::Unitless { name: own(), unit: unit.into() }),
             None => Ok((at, Unit::SI, String::new())),
@@ -278,10 +278,10 @@ fn constant(entry: &str) -> Result<Option<Constant>, MapError> {
     }
     let bad = || MapError::SetValue { name: name.into(), value: number.into() };
     let value = match target.kind {
-        Kind::Text => f64::NAN,
-        Kind::Way => way(number).ok_or_else(bad)?,
-        Kind::Count => return Err(MapError::SetCount(name.into())),
-        Kind::Number(dimension) => {
+        ColumnKind::Text => f64::NAN,
+        ColumnKind::Way => way(number).ok_or_else(bad)?,
+        ColumnKind::Count => return Err(MapError::SetCount(name.into())),
+        ColumnKind::Number(dimension) => {
             // A value without a unit is SI, as the columns of the point table are.
             let unit = unit.unwrap_or(dimension.si());
             let unknown = || MapError::SetUnit { name: name.into(), unit: unit.into(), dimension };
@@ -321,7 +321,7 @@ pub fn under(map: &Map, grid: &Grid, block: &Block) -> Result<Option<Map>, MapEr
         let unit_row = |units: &[String], at: usize| units.get(at).filter(|u| !u.is_empty()).cloned();
         let (was, is) = (unit_row(&grid.units, column.index), unit_row(&block.units, index));
         if grid.header[column.index] != block.header[index] || was != is {
-            let Kind::Number(dimension) = TARGETS[column.target].kind else {
+            let ColumnKind::Number(dimension) = TARGETS[column.target].kind else {
                 column.index = index;
                 continue;
             };

@@ -4,7 +4,7 @@ use super::units::Dimension;
 
 /// How a cell is read.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub enum Kind {
+pub enum ColumnKind {
     /// A number with a unit.
     Number(Dimension),
     /// A whole number.
@@ -23,7 +23,7 @@ pub struct Target {
     /// Column of the point table that it gives.
     pub column: &'static str,
     /// How a cell is read.
-    pub kind: Kind,
+    pub kind: ColumnKind,
     /// What it is.
     pub words: &'static str,
     /// Headers that usually mean it: small letters and digits, the unit taken off.
@@ -44,8 +44,8 @@ macro_rules! targets {
     };
 }
 
+use ColumnKind::{Count, Number, Text, Way};
 use Dimension as D;
-use Kind::{Count, Number, Text, Way};
 
 targets! {
     Point "point" "point" Count, "number of the pass", ["point" "no" "nr" "number" "index"];

@@ -2,7 +2,7 @@
 
 use super::grid::{Cell, Grid, Row};
 use super::map::{Map, way};
-use super::targets::{COUNT, Id, Kind, TARGETS};
+use super::targets::{COUNT, ColumnKind, Id, TARGETS};
 use super::units::{Dimension, Unit};
 use models::condition::Condition;
 use models::covariate;
@@ -59,7 +59,7 @@ impl Values {
     ) -> Result<Self, Dropped> {
         let mut values = Values { place: row.place, numbers: [f64::NAN; COUNT], run: None };
         for constant in &map.constants {
-            if TARGETS[constant.target].kind == Kind::Text {
+            if TARGETS[constant.target].kind == ColumnKind::Text {
                 values.run = Some(constant.text.clone());
             } else {
                 values.numbers[constant.target] = constant.value;
@@ -79,30 +79,32 @@ impl Values {
             let number = || match (cell.ratio(grid.comma), TARGETS[column.target].kind) {
                 (None, _) => cell.digits(grid.comma).and_then(|d| column.unit.apply(&d)),
                 // A minus before a unit turns these too.
-                (Some(ratio), Kind::Number(Dimension::Ratio)) => Some(ratio * column.unit.factor().signum()),
+                (Some(ratio), ColumnKind::Number(Dimension::Ratio)) => {
+                    Some(ratio * column.unit.factor().signum())
+                }
                 // Through the decimal digits: a hundred times 0.07 is not 7.
-                (Some(ratio), Kind::Number(Dimension::Percentage)) => {
+                (Some(ratio), ColumnKind::Number(Dimension::Percentage)) => {
                     Unit::parse(Dimension::Percentage, "1")?.apply(&format!("{ratio:e}"))
                 }
                 _ => None,
             };
             let value = match TARGETS[column.target].kind {
-                Kind::Text => {
+                ColumnKind::Text => {
                     values.run = Some(cell.shown());
                     continue;
                 }
-                Kind::Way => {
+                ColumnKind::Way => {
                     let text = cell.digits(grid.comma).unwrap_or_default();
                     way(&text).ok_or_else(|| drop("no direction: 1, -1, forward or backward is needed"))?
                 }
-                Kind::Count => {
+                ColumnKind::Count => {
                     let whole = |v: &f64| v.fract() == 0.0 && (0.0..9e15).contains(v);
                     number().filter(whole).ok_or_else(|| drop("no whole number"))?
                 }
-                Kind::Number(_) if column.target == Id::Time as usize => {
+                ColumnKind::Number(_) if column.target == Id::Time as usize => {
                     clock.or_else(number).ok_or_else(|| drop("neither a number nor a time of day"))?
                 }
-                Kind::Number(_) => number().ok_or_else(|| drop("no number"))?,
+                ColumnKind::Number(_) => number().ok_or_else(|| drop("no number"))?,
             };
             values.numbers[column.target] = value;
         }

@@ -1,7 +1,7 @@
 //! `docs/reference.md`: every key of every kind of file, from the schemas.
 
 use super::schema::Kind;
-use crate::import::targets::{Kind as Cell, TARGETS};
+use crate::import::targets::{ColumnKind as Cell, TARGETS};
 use serde_json::{Map, Value};
 use std::fmt::Write;
 

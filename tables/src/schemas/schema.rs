@@ -1,6 +1,6 @@
 //! A JSON Schema for every kind of file, from the types that read it.
 
-use crate::import::targets::{Kind as Cell, TARGETS};
+use crate::import::targets::{ColumnKind as Cell, TARGETS};
 use clap::ValueEnum;
 use models::covariate;
 use schemars::generate::SchemaSettings;

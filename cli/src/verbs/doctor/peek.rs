@@ -6,7 +6,6 @@ use drivers::peek::{self, Place, Speed};
 use instruments::schema::Table;
 use std::time::Duration;
 
-/// Arguments.
 #[derive(Debug, clap::Args)]
 pub struct Args {
     /// rtu:PATH or tcp:HOST:PORT with registers, can0 or slcan:PATH for frames, PATH or

@@ -8,7 +8,6 @@ use runs::print::answer_json;
 use runs::report::human::number;
 use std::process::ExitCode;
 
-/// Arguments.
 #[derive(Args)]
 pub struct EffectsArgs {
     /// One effect only

@@ -7,7 +7,7 @@ const FORCE: Parameter = Parameter::positive("adhesive_force", "N", 0.06, 1.0);
 
 pub(super) static EFFECT: Effect = Effect {
     name: "adhesion",
-    place: Place::Contact,
+    place: Location::Contact,
     summary: "The friction limit is mu0 (F + Fa), and contact lasts until the spring pulls with Fa.",
     source: "Derjaguin, Muller, Toporov 1975; Johnson, Kendall, Roberts 1971; capillary and van der Waals pull of tens of mN on a finger",
     laws: &[

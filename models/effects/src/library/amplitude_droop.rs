@@ -7,7 +7,7 @@ const CHECK: &str = "Measure the plate with a vibrometer while the finger is pre
 
 pub(super) static EFFECT: Effect = Effect {
     name: "amplitude_droop",
-    place: Place::Plate,
+    place: Location::Plate,
     summary: "An amplifier without amplitude control lets w fall as the finger's impedance is pressed on the plate.",
     source: "plate impedance M omega/Q of 9 N s/m against 50 to 150 N s/m of a fingertip (upper bound)",
     laws: &[

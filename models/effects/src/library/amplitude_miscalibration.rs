@@ -7,7 +7,7 @@ const CHECK: &str = "Measure the plate with a vibrometer at three drives.";
 
 pub(super) static EFFECT: Effect = Effect {
     name: "amplitude_miscalibration",
-    place: Place::Plate,
+    place: Location::Plate,
     summary: "True amplitude is a constant factor (or a dead zone) away from the commanded one.",
     source: "vibrometer calibrations of drives; confusion of peak and peak-to-peak is a factor of two",
     laws: &[

@@ -7,7 +7,7 @@ const CHECK: &str = "Measure the plate with a vibrometer at the largest drives."
 
 pub(super) static EFFECT: Effect = Effect {
     name: "amplitude_saturation",
-    place: Place::Plate,
+    place: Location::Plate,
     summary: "Above some command the amplitude no longer follows.",
     source: "rail voltage and depolarisation limits of piezo drives",
     laws: &[

@@ -4,7 +4,7 @@ use super::prelude::*;
 
 pub(super) static EFFECT: Effect = Effect {
     name: "contact_ageing",
-    place: Place::Contact,
+    place: Location::Contact,
     summary: "Short contacts have not yet formed all their bonds, so the limit is lower than mu0 F.",
     source: "stochastic adhesion (section 5.4 of the paper); bonding times of 1 to 100 us",
     laws: &[

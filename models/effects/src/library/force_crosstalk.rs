@@ -8,7 +8,7 @@ const CHECK: &str =
 
 pub(super) static EFFECT: Effect = Effect {
     name: "force_crosstalk",
-    place: Place::Instrument,
+    place: Location::Instrument,
     summary: "A share of the normal force is read as lateral force, the same in both directions (or the reverse).",
     source: "cross-talk of 0.3 to 13 % of uncalibrated multi-axis cells",
     laws: &[

@@ -6,7 +6,7 @@ use crate::contact::sweep::root;
 
 pub(super) static EFFECT: Effect = Effect {
     name: "frictional_heating",
-    place: Place::Contact,
+    place: Location::Contact,
     summary: "Friction falls with the power that rubbing dissipates.",
     source: "a contact of 3 mm on a poor conductor warms by some kelvin at 10 mW; Archard's flash temperature",
     laws: &[Law::new(

@@ -10,7 +10,7 @@ const DRIFT: Parameter = Parameter::signed("drift_over_table", "N", 0.015, -0.4,
 
 pub(super) static EFFECT: Effect = Effect {
     name: "lateral_offset_drift",
-    place: Place::Instrument,
+    place: Location::Instrument,
     summary: "An offset of the lateral force, constant or drifting, whatever the load and the direction.",
     source: "thermal drift of 1 to 80 mN per stroke of strain-gauge and piezo cells",
     laws: &[

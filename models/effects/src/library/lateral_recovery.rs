@@ -10,7 +10,7 @@ const LIMITS: [Parameter; 2] = [
 
 pub(super) static EFFECT: Effect = Effect {
     name: "lateral_recovery",
-    place: Place::Contact,
+    place: Location::Contact,
     summary: "Stretch left from the last contact lets the friction force start higher in the next.",
     source: "section 5.3 of the paper (recovery at 1.5 to 15 mm/s); Kelvin-Voigt as the second form",
     laws: &[

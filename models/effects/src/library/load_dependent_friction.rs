@@ -4,7 +4,7 @@ use super::prelude::*;
 
 pub(super) static EFFECT: Effect = Effect {
     name: "load_dependent_friction",
-    place: Place::Contact,
+    place: Location::Contact,
     summary: "The friction coefficient depends on the load, as area-controlled (non-Coulombic) friction has it.",
     source: "F = k W^n with n from 2/3 to 1 (Dzidek 2014); n scatters in active touch (Inoue 2022)",
     laws: &[

@@ -11,7 +11,7 @@ const LEAST_SQUARE: f64 = 4e-4;
 
 pub(super) static EFFECT: Effect = Effect {
     name: "mode_shape",
-    place: Place::Plate,
+    place: Location::Plate,
     summary: "Nodes and antinodes: the amplitude depends on where on the plate the finger is.",
     source: "flexural half-wave of 6 to 14 mm for 1 to 2 mm plates at 25 to 60 kHz",
     laws: &[

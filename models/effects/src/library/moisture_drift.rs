@@ -9,7 +9,7 @@ const APPROACH: &[Parameter] = &[Parameter::signed("relative_change", "1", 0.4, 
 
 pub(super) static EFFECT: Effect = Effect {
     name: "moisture_drift",
-    place: Place::Contact,
+    place: Location::Contact,
     summary: "Friction drifts as the skin under the finger takes up water, with the plate still as well as vibrating.",
     source: "occlusion with a characteristic time of 20 s, up to tenfold (Dzidek 2014); 5 to 2000 s allowed",
     laws: &[

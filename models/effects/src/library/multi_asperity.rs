@@ -5,7 +5,7 @@ use crate::contact::asperities::Heights;
 
 pub(super) static EFFECT: Effect = Effect {
     name: "multi_asperity",
-    place: Place::Contact,
+    place: Location::Contact,
     summary: "Asperities of unequal height touch for unequal times: no kink at the onset, a tail at large amplitude.",
     source: "roughness scale of 0.5 to 3 um; independent sliders on shares of the springs",
     laws: &[

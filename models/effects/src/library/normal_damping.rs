@@ -4,7 +4,7 @@ use super::prelude::*;
 
 pub(super) static EFFECT: Effect = Effect {
     name: "normal_damping",
-    place: Place::Contact,
+    place: Location::Contact,
     summary: "A dashpot beside the normal spring changes how long, and how hard, ridge and plate touch.",
     source: "Kelvin-Voigt normal spring; damping ratios 0.05 to 1 of ridges at 26 to 114 kHz; Friesen 2016",
     laws: &[

@@ -4,7 +4,7 @@ use super::prelude::*;
 
 pub(super) static EFFECT: Effect = Effect {
     name: "normal_gain",
-    place: Place::Instrument,
+    place: Location::Instrument,
     summary: "Normal force read by a constant factor: an exact alias of mu0 and normal stiffness together.",
     source: "calibration drift of force cells; separable only with a dead weight on the normal axis",
     laws: &[Law::new("gain", &[Parameter::signed("log_gain", "1", 0.1, -1.0, 1.0)])

@@ -7,7 +7,7 @@ const CHECK: &str = "Lift the finger and read the normal force; put a dead weigh
 
 pub(super) static EFFECT: Effect = Effect {
     name: "normal_offset",
-    place: Place::Instrument,
+    place: Location::Instrument,
     summary: "Measured normal force = true force + offset; the contact is loaded by the true one.",
     source: "taring with something on the cell; offsets up to 8 % of range",
     laws: &[

@@ -4,7 +4,7 @@ use super::prelude::*;
 
 pub(super) static EFFECT: Effect = Effect {
     name: "plate_tilt",
-    place: Place::Instrument,
+    place: Location::Instrument,
     summary: "A component of the load is read as lateral force, and one of the friction as normal force.",
     source: "rotation of the frame by the angle: Fx' = Fx cos + Fz sin, Fz' = Fz cos - Fx sin",
     // A plate that turns shows in both axes. A lateral cell that is askew by itself reads a share of the

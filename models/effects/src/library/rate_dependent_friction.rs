@@ -7,7 +7,7 @@ const MOST_E_FOLDS: f64 = 2.0;
 
 pub(super) static EFFECT: Effect = Effect {
     name: "rate_dependent_friction",
-    place: Place::Contact,
+    place: Location::Contact,
     summary: "Faster or slower sliding changes mu0 itself; seen with the plate still.",
     source: "exponents of -0.2 to 0.3 on skin; Stribeck minimum near 10 mm/s on steel (Luo 2024)",
     laws: &[

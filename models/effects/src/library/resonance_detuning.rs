@@ -13,7 +13,7 @@ const TIME: Parameter = Parameter::shape("time_constant_over_duration", "1", 0.7
 
 pub(super) static EFFECT: Effect = Effect {
     name: "resonance_detuning",
-    place: Place::Plate,
+    place: Location::Plate,
     summary: "Off resonance the plate moves less than commanded, by the Lorentzian of its quality factor.",
     source: "Q 100 at 27.5 kHz: 138 Hz halve the power; temperature coefficient of the plate's modulus",
     laws: &[

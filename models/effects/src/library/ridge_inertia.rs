@@ -10,7 +10,7 @@ const FLIGHT: &[Parameter] = &[
 
 pub(super) static EFFECT: Effect = Effect {
     name: "ridge_inertia",
-    place: Place::Contact,
+    place: Location::Contact,
     summary: "Ridges thrown off by the plate are touched for a shorter part of the cycle; breaks the collapse on w f.",
     source: "areal mass of 0.3 mm of skin over 34 mm2 gives 8 mg; damping ratios 0.05 to 1 (Friesen 2016)",
     laws: &[Law::new("landing without rebound", FLIGHT), Law::new("rebounding", FLIGHT)],

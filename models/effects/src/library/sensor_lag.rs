@@ -4,7 +4,7 @@ use super::prelude::*;
 
 pub(super) static EFFECT: Effect = Effect {
     name: "sensor_lag",
-    place: Place::Instrument,
+    place: Location::Instrument,
     summary: "A lagging force channel rounds edges and opens loops at reversals, but leaves steady means alone.",
     source: "first-order lag; reversal 10-90 time (models::transient)",
     laws: &[Law::new("first order", &[Parameter::positive("time_constant", "s", 0.01, 1.0)])],

@@ -7,7 +7,7 @@ const CHECK: &str = "Time the stage over its stroke, or read its encoder.";
 
 pub(super) static EFFECT: Effect = Effect {
     name: "speed_error",
-    place: Place::Instrument,
+    place: Location::Instrument,
     summary: "True speed is a factor (or a constant) away from the commanded one; the factor may change with speed.",
     source: "wrong lead or step count; separable from a stiffness only with an encoder",
     laws: &[

@@ -5,7 +5,7 @@ use std::f64::consts::PI;
 
 pub(super) static EFFECT: Effect = Effect {
     name: "speed_ripple",
-    place: Place::Instrument,
+    place: Location::Instrument,
     summary: "Speed varies along the stroke with the screw's pitch, and friction follows where it depends on speed.",
     source: "lead screws of 1 to 10 mm pitch",
     laws: &[Law::new(

@@ -32,7 +32,7 @@ const POWERS: [Parameter; 6] = [
 
 pub(super) static EFFECT: Effect = Effect {
     name: "squeeze_film",
-    place: Place::Contact,
+    place: Location::Contact,
     summary: "Compressed air carries a share of the load that grows with amplitude and ambient pressure.",
     source: "Wiertlewski, Friesen, Colgate 2016 (partial levitation); infinite squeeze number, in its small-amplitude form and for \
          any excursion (Langlois 1962, Salbu 1964)",

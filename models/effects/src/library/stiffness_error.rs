@@ -4,7 +4,7 @@ use super::prelude::*;
 
 pub(super) static EFFECT: Effect = Effect {
     name: "stiffness_error",
-    place: Place::Finger,
+    place: Location::Finger,
     summary: "Normal or lateral stiffness lies outside the range that its calibration states.",
     source: "spread of ultrasonic stiffness in the paper (0.2 to 4 MN/m); rig.toml's prior is the nuisance",
     laws: &[

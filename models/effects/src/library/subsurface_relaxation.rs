@@ -17,7 +17,7 @@ const LOGARITHMIC: &[Parameter] = &[
 
 pub(super) static EFFECT: Effect = Effect {
     name: "subsurface_relaxation",
-    place: Place::Contact,
+    place: Location::Contact,
     summary: "Creep of the soft tissue changes the stiffness of the contact with time, not its friction coefficient.",
     source: "longest relaxation time of a finger pad about 3 s (the paper's introduction); area grows as log t",
     laws: &[

@@ -7,7 +7,7 @@ fn shown(faults: &[Fault], seed: u64, cycles: u64) -> Vec<Forces> {
     let sensor = Port {
         state: |now: Nanos| {
             let sample = nth(now.0 / T);
-            Forces { lateral: Ok(sample), normal: Ok(Reading { value: 1000.0 + sample.value, ..sample }) }
+            Forces { lateral: Ok(sample), normal: Ok(Sample { value: 1000.0 + sample.value, ..sample }) }
         },
         command: (),
     };
@@ -74,7 +74,7 @@ fn off_is_silence() {
 
 #[test]
 fn stuck_stands_still_while_counters_and_clocks_go_on() {
-    let held = |cycle, since| Ok(Reading { value: nth(since).value, raw: nth(since).raw, ..nth(cycle) });
+    let held = |cycle, since| Ok(Sample { value: nth(since).value, raw: nth(since).raw, ..nth(cycle) });
     is(FaultMode::Stuck, 0.0, |cycle| held(cycle, 10));
     // A second time it stands where it is then, not where it stood before.
     let first = fault(Target::Lateral, FaultMode::Stuck, 0.0);
@@ -117,7 +117,7 @@ fn what_is_missing_stays_missing_under_a_fault() {
 fn garbage_is_anything_and_keeps_count_and_time() {
     let cycles = 8000;
     let shown = shown(&[always(Target::Lateral, FaultMode::Garbage, 0.0)], 3, cycles);
-    let readings: Vec<Reading> = shown.iter().map(|forces| forces.lateral.unwrap()).collect();
+    let readings: Vec<Sample> = shown.iter().map(|forces| forces.lateral.unwrap()).collect();
     for (cycle, reading) in (0..).zip(&readings) {
         assert_eq!((reading.sequence, reading.taken_at), (nth(cycle).sequence, nth(cycle).taken_at));
         assert!((-(1 << 23)..1 << 23).contains(&reading.raw), "{}", reading.raw);
@@ -144,7 +144,7 @@ fn garbage_is_anything_and_keeps_count_and_time() {
 
 #[test]
 fn wrong_is_a_factor_on_value_and_counts() {
-    let wrong = |cycle| Reading { value: -0.5 * nth(cycle).value, raw: -5 * cycle as i64, ..nth(cycle) };
+    let wrong = |cycle| Sample { value: -0.5 * nth(cycle).value, raw: -5 * cycle as i64, ..nth(cycle) };
     is(FaultMode::Wrong, FaultMode::Wrong.default_strength(), |cycle| Ok(wrong(cycle)));
 }
 
@@ -192,7 +192,7 @@ fn intermittent_loses_its_share_the_same_from_the_same_seed() {
 
 #[test]
 fn a_spike_is_one_sample_a_hundred_times_too_large() {
-    let spike = |cycle| Reading { value: 100.0 * nth(cycle).value, raw: 1000 * cycle as i64, ..nth(cycle) };
+    let spike = |cycle| Sample { value: 100.0 * nth(cycle).value, raw: 1000 * cycle as i64, ..nth(cycle) };
     let once = FaultMode::Spikes.default_strength();
     is(FaultMode::Spikes, once, |cycle| Ok(if cycle == 10 { spike(10) } else { nth(cycle) }));
     // One in three, from the first on: samples 12, 15 and 18 are those of cycles 11, 14 and 17.
@@ -203,7 +203,7 @@ fn a_spike_is_one_sample_a_hundred_times_too_large() {
 
 #[test]
 fn saturated_says_so() {
-    let end = |cycle| Reading { quality: Quality::Saturated, raw: i64::from(i32::MAX), ..nth(cycle) };
+    let end = |cycle| Sample { quality: Quality::Saturated, raw: i64::from(i32::MAX), ..nth(cycle) };
     is(FaultMode::Saturated, 0.0, |cycle| Ok(end(cycle)));
 }
 
@@ -223,13 +223,11 @@ fn disordered_is_every_other_sample_three_old_with_its_old_stamp() {
 
 #[test]
 fn a_clock_that_jumps_moves_the_stamp_alone() {
-    let jumped = |cycle: u64, by: i64| Reading {
-        taken_at: Nanos(at(cycle).0.saturating_add_signed(by)),
-        ..nth(cycle)
-    };
+    let jumped =
+        |cycle: u64, by: i64| Sample { taken_at: Nanos(at(cycle).0.saturating_add_signed(by)), ..nth(cycle) };
     is(FaultMode::ClockJump, 0.5, |cycle| Ok(jumped(cycle, 500_000_000)));
     is(FaultMode::ClockJump, -0.002, |cycle| Ok(jumped(cycle, -2_000_000)));
-    is(FaultMode::ClockJump, -1.0, |cycle| Ok(Reading { taken_at: Nanos(0), ..nth(cycle) }));
+    is(FaultMode::ClockJump, -1.0, |cycle| Ok(Sample { taken_at: Nanos(0), ..nth(cycle) }));
 }
 
 /// A sensor that samples slower than the loop turns is read many times over: what the line lost does not come after all.

@@ -6,13 +6,13 @@ use models::quantity::PeakToPeak;
 /// The amplifier's state of a cycle: everything in it is of that cycle.
 fn amplifier(cycle: u64) -> AmplifierState {
     AmplifierState {
-        amplitude: Ok(Reading { value: 1e-6 * cycle as f64, ..nth(cycle) }),
+        amplitude: Ok(Sample { value: 1e-6 * cycle as f64, ..nth(cycle) }),
         echoed_amplitude: PeakToPeak::from_metres(1.1e-6 * cycle as f64),
         echoed_frequency_hz: 27_000.0 + cycle as f64,
         output_on: cycle % 3 == 1,
         watchdog_tripped: false,
         fault: false,
-        temperature_c: Ok(Reading { value: 25.0 + cycle as f64, ..nth(cycle) }),
+        temperature_c: Ok(Sample { value: 25.0 + cycle as f64, ..nth(cycle) }),
         taken_at: at(cycle),
         sequence: cycle as u32,
     }
@@ -70,7 +70,7 @@ fn stuck_states_show_what_was_and_count_on() {
     amplifier_is(FaultMode::Stuck, 0.0, |cycle| {
         let (now, held) = (amplifier(cycle), amplifier(10));
         let read = held.amplitude.unwrap();
-        let amplitude = Ok(Reading { value: read.value, raw: read.raw, ..now.amplitude.unwrap() });
+        let amplitude = Ok(Sample { value: read.value, raw: read.raw, ..now.amplitude.unwrap() });
         let (taken_at, sequence, temperature_c) = (now.taken_at, now.sequence, now.temperature_c);
         AmplifierState { amplitude, taken_at, sequence, temperature_c, ..held }
     });
@@ -86,7 +86,7 @@ fn wrong_states_are_out_by_a_factor() {
         let now = amplifier(cycle);
         let read = now.amplitude.unwrap();
         AmplifierState {
-            amplitude: Ok(Reading { value: -2.0 * read.value, raw: -2 * read.raw, ..read }),
+            amplitude: Ok(Sample { value: -2.0 * read.value, raw: -2 * read.raw, ..read }),
             ..now
         }
     });
@@ -101,7 +101,7 @@ fn saturated_states_are_at_the_end_of_the_range() {
     amplifier_is(FaultMode::Saturated, 0.0, |cycle| {
         let now = amplifier(cycle);
         let (quality, raw) = (Quality::Saturated, i64::from(i32::MAX));
-        AmplifierState { amplitude: Ok(Reading { quality, raw, ..now.amplitude.unwrap() }), ..now }
+        AmplifierState { amplitude: Ok(Sample { quality, raw, ..now.amplitude.unwrap() }), ..now }
     });
     stage_is(FaultMode::Saturated, 0.0, |cycle| StageState { at_limit: true, ..stage(cycle) });
 }

@@ -6,7 +6,7 @@ use super::*;
 use crate::cycle::{Command, Marker};
 use crate::estimate::EstimateConfig;
 use crate::ports::{
-    Amplifier, AmplifierState, ForceSensor, Forces, NoData, Quality, Reading, Stage, StageState,
+    Amplifier, AmplifierState, ForceSensor, Forces, NoData, Quality, Sample, Stage, StageState,
 };
 use crate::safety::{Cause, Limits, Request};
 use models::prediction::SpringSlider;
@@ -44,8 +44,8 @@ struct Rig {
     last: DriveCommand,
 }
 
-fn reading(value: f64, sequence: u32, taken_at: Nanos) -> Reading {
-    Reading { value, raw: i64::from(sequence % 97), taken_at, sequence, quality: Quality::Good }
+fn reading(value: f64, sequence: u32, taken_at: Nanos) -> Sample {
+    Sample { value, raw: i64::from(sequence % 97), taken_at, sequence, quality: Quality::Good }
 }
 
 impl ForceSensor for Rig {

@@ -285,7 +285,7 @@ fn an_amplitude_rate_is_a_difference_over_a_time() {
 /// Shares of lost samples at the very limits: 85 of a hundred for the remark, 25 for the trip.
 #[test]
 fn lost_samples_are_counted_in_whole_windows() {
-    type Pick = fn(&mut Observation) -> &mut Reading;
+    type Pick = fn(&mut Observation) -> &mut Sample;
     let lose = |channel: Pick, came: u32| {
         let mut bench = bench();
         (bench.limits.timing.lateral.periods, bench.limits.timing.normal.periods) = (1000, 1000);

@@ -1,7 +1,7 @@
 //! Where a cause acts, as a small drawing: finger, contact, air, plate, instruments; the part that acts is
 //! filled.
 
-use effects::{Effect, Place};
+use effects::{Effect, Location};
 
 /// Causes of which the contact is one through air.
 const IN_AIR: [&str; 1] = ["squeeze_film"];
@@ -18,11 +18,11 @@ const PARTS: [(&str, &str, [u32; 2]); 5] = [
 /// The drawing of a cause.
 pub fn drawing(effect: &Effect) -> String {
     let place = match effect.place {
-        Place::Contact if IN_AIR.contains(&effect.name) => "air",
-        Place::Contact => "contact",
-        Place::Finger => "finger",
-        Place::Plate => "plate",
-        Place::Instrument => "instruments",
+        Location::Contact if IN_AIR.contains(&effect.name) => "air",
+        Location::Contact => "contact",
+        Location::Finger => "finger",
+        Location::Plate => "plate",
+        Location::Instrument => "instruments",
     };
     let part = |(name, outline, [x, y]): &(&str, &str, [u32; 2])| {
         let (fill, weight) = if *name == place { ("#d55e00", "700") } else { ("#ececec", "400") };

@@ -1,12 +1,12 @@
 //! One sealed set a case, made, diagnosed and scored: case `i` is the `i`th set that `muprime blind --seed SEED` scores.
 
-use super::{Case, Kind, document, flag, joined, no_lines, number, settings, text};
+use super::{Case, CaseKind, document, flag, joined, no_lines, number, settings, text};
 use crate::cases::{file::Header, run::here};
 pub use crate::validation::blind::Settings;
 use crate::validation::blind::{Scored, score, set};
 
 /// The kind.
-pub const KIND: Kind = Kind {
+pub const KIND: CaseKind = CaseKind {
     name: "blind",
     words: "a sealed set of the independent simulation, diagnosed and scored, as `muprime blind` does",
     model: 1,

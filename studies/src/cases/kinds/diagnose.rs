@@ -1,6 +1,6 @@
 //! The diagnosis of one table a case: a laboratory's archive. The key holds the contents of table and rig.toml, not their names.
 
-use super::{Case, Cell, Kind, count, joined, line, number, text};
+use super::{Case, CaseKind, Cell, count, joined, line, number, text};
 use crate::cases::file::Header;
 use calibration::certificate::sha256_hex;
 use diagnosis::document::document;
@@ -13,7 +13,7 @@ use tables::passes::parse_passes;
 use tables::verdict::{Subject, inputs};
 
 /// The kind.
-pub const KIND: Kind = Kind {
+pub const KIND: CaseKind = CaseKind {
     name: "diagnose",
     words: "the diagnosis of a point table or of a run's folder, as `muprime diagnose` makes it",
     model: 1,

@@ -1,13 +1,13 @@
 //! One scene of the fault bench a case: case `i` is the seed `first + i`.
 
-use super::{Case, Cell, Kind, count, document, no_lines, settings, text};
+use super::{Case, CaseKind, Cell, count, document, no_lines, settings, text};
 use crate::cases::{file::Header, run::here};
 use crate::validation::faults::search::{judged, scene_of};
 use crate::validation::faults::{Found, Pace, ROWS, Tally};
 use serde::{Deserialize, Serialize};
 
 /// The kind.
-pub const KIND: Kind = Kind {
+pub const KIND: CaseKind = CaseKind {
     name: "faults",
     words: "a scene of the fault bench a seed, as `muprime faults` runs them",
     model: 2,

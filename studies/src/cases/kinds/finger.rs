@@ -1,6 +1,6 @@
 //! The identification of one finger from its phases a case: a population of fingers.
 
-use super::{Case, Kind, line, number, text};
+use super::{Case, CaseKind, line, number, text};
 use crate::cases::file::Header;
 use calibration::certificate::sha256_hex;
 use calibration::phase::table::read_phases;
@@ -11,7 +11,7 @@ use serde::{Deserialize, Serialize};
 use std::path::{Path, PathBuf};
 
 /// The kind.
-pub const KIND: Kind = Kind {
+pub const KIND: CaseKind = CaseKind {
     name: "finger",
     words: "the skin of one finger from its phase table, as `muprime calibrate finger` finds it",
     model: models::ridge::study::MODEL_VERSION,

@@ -1,12 +1,12 @@
 //! Cases that hash and do nothing else: what worker, engine and file system cost beside them is measured with these.
 
-use super::{Case, Cell, Kind, no_lines, settings, text};
+use super::{Case, CaseKind, Cell, no_lines, settings, text};
 use crate::cases::file::{Header, hex};
 use serde::{Deserialize, Serialize};
 use sha2::{Digest, Sha256};
 
 /// The kind.
-pub const KIND: Kind = Kind {
+pub const KIND: CaseKind = CaseKind {
     name: "noop",
     words: "hashes so many times: measures what a study costs beside its cases",
     model: 1,

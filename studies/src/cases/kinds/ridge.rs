@@ -1,6 +1,6 @@
 //! One case of the finite element model a case: listed, or drawn evenly from a box of up to ten variables.
 
-use super::{Case, Cell, Column, Kind, count, flag, number};
+use super::{Case, CaseKind, Cell, Column, count, flag, number};
 use crate::cases::file::Header;
 use miette::IntoDiagnostic;
 use models::quantity::PeakToPeak;
@@ -9,7 +9,7 @@ use serde::{Deserialize, Serialize};
 use std::collections::BTreeMap;
 
 /// The kind.
-pub const KIND: Kind = Kind {
+pub const KIND: CaseKind = CaseKind {
     name: "ridge",
     words: "a case of the finite element model, as `muprime model ridge` runs it",
     model: study::MODEL_VERSION,

@@ -1,6 +1,6 @@
 //! One node of the shipped surrogate's table a case, then those held out to judge it.
 
-use super::{Case, Cell, Kind, flag, no_lines, number};
+use super::{Case, CaseKind, Cell, flag, no_lines, number};
 use crate::cases::file::Header;
 use crate::cases::run::Entry;
 use miette::bail;
@@ -8,7 +8,7 @@ use models::ridge::{self, study};
 use models::surrogate::{Grid, GridPoint, TableResult};
 
 /// The kind.
-pub const KIND: Kind = Kind {
+pub const KIND: CaseKind = CaseKind {
     name: "table",
     words: "a node of the surrogate's table, as `muprime model table --surrogate` computes it",
     model: study::MODEL_VERSION,

@@ -6,7 +6,7 @@ use diagnosis::hypotheses::Options;
 use diagnosis::verdict::{Report, diagnose};
 use rayon::prelude::*;
 use serde::Serialize;
-use sim::defects::Kind;
+use sim::defects::DefectKind;
 use sim::sealed::rough::{RoughSet, Roughness, rough};
 
 /// What a set may hold: nothing, or one of these causes.
@@ -118,9 +118,9 @@ pub fn run(
         .map(|truth| {
             let kind = match *truth {
                 "none" => None,
-                cause => {
-                    Some(Kind::named(cause).ok_or_else(|| miette::miette!("no cause is named '{cause}'"))?)
-                }
+                cause => Some(
+                    DefectKind::named(cause).ok_or_else(|| miette::miette!("no cause is named '{cause}'"))?,
+                ),
             };
             let all: Vec<Answers> = (0..count as u64)
                 .into_par_iter()

@@ -1,7 +1,7 @@
 //! What instruments show that must not be: a wrapper around the virtual rig's ports that alters what they say.
 
 use realtime::ports::{
-    Amplifier, AmplifierState, ForceSensor, Forces, Nanos, NoData, Quality, Reading, Stage, StageState,
+    Amplifier, AmplifierState, ForceSensor, Forces, Nanos, NoData, Quality, Sample, Stage, StageState,
 };
 use realtime::safety::{DriveCommand, StageCommand};
 use std::sync::Arc;
@@ -53,7 +53,7 @@ pub struct Tampered<P> {
     pub shown: Arc<AtomicU64>,
     /// Cycles tampered with, and what is held since the first.
     pub cycles: u64,
-    pub held: Option<Reading>,
+    pub held: Option<Sample>,
 }
 
 impl<P> Tampered<P> {
@@ -70,7 +70,7 @@ impl<P> Tampered<P> {
     }
 }
 
-fn shift(reading: &mut Result<Reading, NoData>, by: f64) {
+fn shift(reading: &mut Result<Sample, NoData>, by: f64) {
     if let Ok(reading) = reading {
         reading.value += by;
         reading.raw += (by * 1e5) as i64;
