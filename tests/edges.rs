@@ -6,7 +6,7 @@ use models::prediction::SpringSlider;
 use rayon::prelude::*;
 use runs::plan::Plan;
 use runs::sequence::Outcome;
-use runs::session::rehearse_watched;
+use runs::session::rehearse;
 use runs::setup::Setup;
 use runs::verdict::edges::Collector;
 use sim::defects::Defects;
@@ -40,8 +40,7 @@ fn run(seed: u64, world: &WorldConfig) -> [Comparison; 2] {
     let model = Arc::new(SpringSlider::new(setup.tip.finger).unwrap());
     let mut found = Collector::default();
     let plan = Plan::parse("edges", PLAN).unwrap();
-    let done =
-        rehearse_watched(&setup, &plan, seed, world, model.clone(), &mut |row| found.row(row)).unwrap();
+    let done = rehearse(&setup, &plan, seed, world, model.clone(), &mut |row| found.row(row)).unwrap();
     assert_eq!(done.outcome, Outcome::Complete, "{world:?}");
     let part = judge(&found.edges, &*model, setup.lateral_passband_hz());
     part.comparisons.try_into().unwrap()

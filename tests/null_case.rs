@@ -63,7 +63,8 @@ fn run_all(world: &WorldConfig, runs: u64) -> Vec<Rehearsal> {
     (0..runs)
         .into_par_iter()
         .map(|i| {
-            let done = rehearse(&setup, &plan, FIRST_SEED + i, world, Arc::clone(&model)).unwrap();
+            let done =
+                rehearse(&setup, &plan, FIRST_SEED + i, world, Arc::clone(&model), &mut |_| {}).unwrap();
             assert_eq!(done.outcome, Outcome::Complete);
             done
         })

@@ -509,8 +509,8 @@ fn dip_table(low: f64, high: f64) -> String {
     text
 }
 
-/// A sealed set of the outside simulation without a cause; the forces of `size` times the dip come on top, noise
-/// included.
+/// A sealed set of the outside simulation without a cause; the forces of `size` times the dip come on top,
+/// noise included.
 fn dipped(at: &Path, seed: u64, size: f64) -> sim::sealed::Set {
     let mut set = sim::sealed::generate(seed, sim::sealed::Stratum::None, sim::sealed::Ask::Gain);
     for pass in &mut set.passes {
@@ -524,8 +524,8 @@ fn dipped(at: &Path, seed: u64, size: f64) -> sim::sealed::Set {
     set
 }
 
-/// An effect of the user's own, as a table, on data of another simulation: named with its size where it is there, not
-/// named where it is not, in a corrected model and its predictions.
+/// An effect of the user's own, as a table, on data of another simulation: named with its size where it is
+/// there, not named where it is not, in a corrected model and its predictions.
 #[test]
 fn an_effect_of_ones_own_is_one_more_hypothesis() {
     let folder = tempfile::tempdir().unwrap();

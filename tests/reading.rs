@@ -119,7 +119,8 @@ fn on_the_virtual_rig(strokes: f64) -> Vec<ReadingFinding> {
     (0..sweeps())
         .into_par_iter()
         .map(|i| {
-            let run = rehearse(&setup, &plan, FIRST_SEED + i, &world, Arc::clone(&model) as _).unwrap();
+            let run = rehearse(&setup, &plan, FIRST_SEED + i, &world, Arc::clone(&model) as _, &mut |_| {})
+                .unwrap();
             assert_eq!(run.outcome, Outcome::Complete);
             let passes =
                 run.passes.iter().filter_map(|p| Some((p.pass.condition(1.0), p.pass.friction_force_n()?)));

@@ -17,8 +17,8 @@ fn report(set: &RoughSet) -> Report {
     answer(set, &quick()).expect("a sealed table is no impossible one")
 }
 
-/// Bad passes, heavy tails, scatter that lasts, runs and a wrong statement make no gap out of nothing, nor one
-/// of a structure that no map follows (tests/structure.rs).
+/// Bad passes, heavy tails, scatter that lasts, runs and a wrong statement make no gap out of nothing, nor
+/// one of a structure that no map follows (tests/structure.rs).
 #[test]
 fn scatter_alone_is_no_gap() {
     for kind in Roughness::ALL {

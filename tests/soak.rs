@@ -1,7 +1,7 @@
 //! Long runs: nothing trips, nothing grows.
 //!
-//! Short by default. One simulated day:
-//! `MUPRIME_SOAK_VIRTUAL_S=86400 cargo test --release -p muprime-tests --test soak virtual_time -- --nocapture`.
+//! Short by default. One simulated day: `MUPRIME_SOAK_VIRTUAL_S=86400 cargo test --release -p muprime-tests
+//! --test soak virtual_time -- --nocapture`.
 
 use models::condition::{Condition, OutOfDomain};
 use models::prediction::{EmpiricalPsi, FrictionModel, Prediction};

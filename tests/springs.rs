@@ -26,7 +26,7 @@ fn swept(sweeps: u64, world: &WorldConfig) -> Vec<(Vec<Pass>, f64)> {
         .into_par_iter()
         .map(|i| {
             let seed = FIRST_SEED + i;
-            let run = rehearse(&setup, &plan, seed, world, Arc::clone(&model) as _).unwrap();
+            let run = rehearse(&setup, &plan, seed, world, Arc::clone(&model) as _, &mut |_| {}).unwrap();
             assert_eq!(run.outcome, Outcome::Complete);
             let finger = Finger::new(&world.finger, seed);
             let truth = finger.lateral_stiffness_n_per_m / finger.normal_stiffness_n_per_m;

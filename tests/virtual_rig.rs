@@ -106,8 +106,8 @@ fn repeatability_and_pass_noise_are_those_that_the_world_states() {
     let ratio: Vec<f64> = strokes.iter().map(|(_, l, f)| l / f / 0.5 - 1.0).collect();
     let mean = ratio.iter().sum::<f64>() / n as f64;
     let sd = (ratio.iter().map(|r| (r - mean).powi(2)).sum::<f64>() / (n as f64 - 1.0)).sqrt();
-    // Repeatability, and the stated scatter of either axis at 0.25 and 0.5 N.
-    // Mean over t of a wander with correlation time T: variance 2 T/t (1 - T/t (1 - exp(-t/T))), and white noise.
+    // Repeatability, and the stated scatter of either axis at 0.25 and 0.5 N. Mean over t of a wander with
+    // correlation time T: variance 2 T/t (1 - T/t (1 - exp(-t/T))), and white noise.
     let [lateral_sd, normal_sd] = [0, 1].map(|axis| {
         let (s, seconds) = (&config.sensor, 0.5);
         let r = s.wander_time_s / seconds;

@@ -77,8 +77,8 @@ const UNREAD: &str = "unread.txt";
 /// The folder of the run that this process leads.
 static RUN: OnceLock<PathBuf> = OnceLock::new();
 
-/// A rig is driven from now on: nobody waits for a reader of standard output or standard error, and what they do not take stands in
-/// the run's folder afterwards.
+/// A rig is driven from now on: nobody waits for a reader of standard output or standard error, and what they
+/// do not take stands in the run's folder afterwards.
 ///
 /// # Errors
 /// The system gives no thread.

@@ -103,8 +103,8 @@ pub fn decide(fitted: &mut Fitted) -> Decision {
     Decision { verdict, none, unknown, probabilities, class, gate: judged, regions }
 }
 
-/// Probabilities with the chance that the method errs and does not see it: none is then surer than verdicts on
-/// labelled sets have been right, and none is 1e-40.
+/// Probabilities with the chance that the method errs and does not see it: none is then surer than verdicts
+/// on labelled sets have been right, and none is 1e-40.
 fn doubted(fitted: &Fitted, none: f64, unknown: f64, probabilities: &mut [f64]) -> (f64, f64) {
     let doubt = fitted.problem.constants.doubt;
     let (no_gap, open, each) = fitted.coarse();
@@ -297,8 +297,8 @@ mod tests {
         }
     }
 
-    /// Of a gap of several hundred nats the true cause is named, at no more than the method's doubt leaves, and
-    /// no cause is ruled out altogether.
+    /// Of a gap of several hundred nats the true cause is named, at no more than the method's doubt leaves,
+    /// and no cause is ruled out altogether.
     #[test]
     fn a_name_leaves_room_for_doubt() {
         let table = table(&mut Deviates(5), 0.6);

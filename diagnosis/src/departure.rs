@@ -186,8 +186,8 @@ impl Change {
         Change { net, bent }
     }
 
-    /// The same at conditions of another problem, where the hypothesis predicts `plain`, with the recalibration
-    /// and the deviations of this one.
+    /// The same at conditions of another problem, where the hypothesis predicts `plain`, with the
+    /// recalibration and the deviations of this one.
     pub fn at(
         &self,
         out: &Problem,

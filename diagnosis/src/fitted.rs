@@ -142,8 +142,8 @@ impl Fitted {
             .sort_by(|a, b| b.log_probability.total_cmp(&a.log_probability).then(a.effects.cmp(&b.effects)));
     }
 
-    /// Probabilities as they would be if the evidence counted for next to nothing: of no gap, of the open set,
-    /// and of each cause. It is all that stands where the method errs without seeing it.
+    /// Probabilities as they would be if the evidence counted for next to nothing: of no gap, of the open
+    /// set, and of each cause. It is all that stands where the method errs without seeing it.
     pub(crate) fn coarse(&self) -> (f64, f64, Vec<f64>) {
         let k = &self.problem.constants;
         let [none, smooth] = self.evidence;

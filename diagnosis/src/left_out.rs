@@ -318,8 +318,8 @@ mod tests {
     use super::*;
     use crate::example::{Deviates, rig, table};
 
-    /// Where true causes of a foreign form and mimics close as much, neither is ruled out; a cause that closes
-    /// nothing is, and one that closes nearly all stays.
+    /// Where true causes of a foreign form and mimics close as much, neither is ruled out; a cause that
+    /// closes nothing is, and one that closes nearly all stays.
     #[test]
     fn the_gate_is_open_where_causes_and_mimics_close_as_much() {
         let k = Constants::default();

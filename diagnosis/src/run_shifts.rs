@@ -69,8 +69,8 @@ mod tests {
     use crate::hypotheses::Options;
     use crate::verdict::diagnose;
 
-    /// Three runs of which one reads 12 % more, no other gap: what the verdict's model says is the recalibrated
-    /// baseline, and a sensor in that run reads more.
+    /// Three runs of which one reads 12 % more, no other gap: what the verdict's model says is the
+    /// recalibrated baseline, and a sensor in that run reads more.
     #[test]
     fn the_shift_of_a_run_is_no_part_of_the_verdicts_model() {
         let mut table = table(&mut Deviates(11), 0.0);

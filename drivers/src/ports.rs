@@ -123,8 +123,7 @@ impl ForceSensor for Pair {
     }
 }
 
-/// The rig's force sensor out of one or two instruments, each with which axes it gives
-/// (lateral, normal).
+/// The rig's force sensor out of one or two instruments, each with which axes it gives (lateral, normal).
 ///
 /// # Errors
 /// Where an axis is given by no instrument or by two.

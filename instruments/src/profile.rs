@@ -9,8 +9,6 @@ mod fits;
 mod frame;
 mod sets;
 
-use std::collections::HashMap;
-
 use crate::codec::dbc::DbcSignal;
 use crate::error::ProfileError;
 use crate::expression::Expression;
@@ -20,6 +18,7 @@ use compile::Compiler;
 pub use frame::{Frame, FrameKind, MOST_REGISTERS, Part, Span};
 use sets::CompiledSet;
 pub use sets::SetError;
+use std::collections::HashMap;
 
 /// Index of a frame (poll) of one profile.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]

@@ -40,8 +40,8 @@ impl std::fmt::Display for CertificateKind {
     }
 }
 
-/// Declares what a certificate can bound: the key, its words, the kind of certificate that states it; its entry
-/// in `[calibration]`, and the largest standard uncertainty that can be meant.
+/// Declares what a certificate can bound: the key, its words, the kind of certificate that states it; its
+/// entry in `[calibration]`, and the largest standard uncertainty that can be meant.
 macro_rules! certified_keys {
     ($(
         $(#[$about:meta])* $key:ident, $words:literal, $kind:expr;

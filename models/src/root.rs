@@ -123,9 +123,9 @@ pub fn bisection(ends: [f64; 2], times: u32, below: impl FnMut(f64) -> bool) -> 
     0.5 * (low + high)
 }
 
-/// The root in a bracket by Newton's rule from `start`. `look` gives at a place whether the root lies below it and
-/// where the rule leads; the middle stands for a place outside of the bracket. It ends with a step shorter than
-/// `close`, which depends on the place before it.
+/// The root in a bracket by Newton's rule from `start`. `look` gives at a place whether the root lies below
+/// it and where the rule leads; the middle stands for a place outside of the bracket. It ends with a step
+/// shorter than `close`, which depends on the place before it.
 pub fn newton_or_half(
     [mut low, mut high]: [f64; 2],
     start: f64,

@@ -1,6 +1,6 @@
-//! Convergence of Psi* itself with the time step, and what a softer spring along the plate does to it, on a part of Fig. 12: 200 elements,
-//! its frequencies, frictions and speeds at four amplitudes. The mesh's convergence takes minutes: `muprime model reproduce fig12 --elements N`
-//! prints it (docs/ridge.md).
+//! Convergence of Psi* itself with the time step, and what a softer spring along the plate does to it, on a
+//! part of Fig. 12: 200 elements, its frequencies, frictions and speeds at four amplitudes. The mesh's
+//! convergence takes minutes: `muprime model reproduce fig12 --elements N` prints it (docs/ridge.md).
 
 use muprime_models::psi_fit::{PsiFit, fit};
 use muprime_models::reading::Reading;

@@ -1,7 +1,7 @@
 //! The thread of the loop: absolute deadlines, priority, locked memory, lateness histogram.
 //!
-//! What a loop is to ask of the machine and what it reports is plain data on any system; the thread itself ([`run`],
-//! in `pacing/thread.rs`) and its calls of the machine (`pacing/machine.rs`) need Linux.
+//! What a loop is to ask of the machine and what it reports is plain data on any system; the thread itself
+//! ([`run`], in `pacing/thread.rs`) and its calls of the machine (`pacing/machine.rs`) need Linux.
 
 #[cfg(target_os = "linux")]
 mod machine;

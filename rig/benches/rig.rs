@@ -112,7 +112,9 @@ fn sweep_in_virtual_time(bencher: Bencher<'_, '_>) {
     let setup = Setup::load("virtual").unwrap();
     let plan = Plan::load("first-sweep").unwrap();
     let model: Arc<dyn FrictionModel> = Arc::new(SpringSlider::new(setup.tip.finger).unwrap());
-    let run = |seed| rehearse(&setup, &plan, seed, &WorldConfig::bundled(), Arc::clone(&model)).unwrap();
+    let run = |seed| {
+        rehearse(&setup, &plan, seed, &WorldConfig::bundled(), Arc::clone(&model), &mut |_| {}).unwrap()
+    };
     let cycles = run(1).cycles;
     bencher.counter(ItemsCount::new(cycles)).bench_local(|| run(1));
 }

@@ -1,6 +1,6 @@
 //! Prints the lateness of the loop's thread with idle ports, as quantiles in us: `p50 p99 p99.9 max`.
-//! `benches/lateness` runs it in turn with cyclictest. After the seconds come, in any order, `cpu=1`, `spin_us=100`, `awake`: what a
-//! setup's `[loop]` may ask for.
+//! `benches/lateness` runs it in turn with cyclictest. After the seconds come, in any order, `cpu=1`,
+//! `spin_us=100`, `awake`: what a setup's `[loop]` may ask for.
 #![allow(clippy::disallowed_methods, reason = "it measures time")]
 
 use models::finger::Finger;

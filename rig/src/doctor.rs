@@ -1,5 +1,5 @@
-//! The instruments of a setup, looked at together as a run's loop would, and judged by what a run needs. Nothing is commanded but
-//! the safe set-points with which every link begins and ends.
+//! The instruments of a setup, looked at together as a run's loop would, and judged by what a run needs.
+//! Nothing is commanded but the safe set-points with which every link begins and ends.
 
 #![allow(clippy::disallowed_methods, reason = "instruments are looked at in wall-clock time; no loop runs")]
 
@@ -173,8 +173,8 @@ impl Look {
     }
 }
 
-/// The rules of the loop over what is seen, without a hand at the dead-man device and without a relay that nobody closes: those are
-/// judged apart.
+/// The rules of the loop over what is seen, without a hand at the dead-man device and without a relay that
+/// nobody closes: those are judged apart.
 struct Rules {
     config: Config,
     state: CycleState,

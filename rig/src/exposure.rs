@@ -131,9 +131,9 @@ pub struct Ledger {
 }
 
 impl Ledger {
-    /// Opens the ledger of a setup's amplifier and of the person (the subject, else the operator), where a human finger is in the
-    /// rig: what cannot be read, or cannot be written, refuses the finger. `None` without a finger, and for an amplifier inside this
-    /// program, which vibrates nobody.
+    /// Opens the ledger of a setup's amplifier and of the person (the subject, else the operator), where a
+    /// human finger is in the rig: what cannot be read, or cannot be written, refuses the finger. `None`
+    /// without a finger, and for an amplifier inside this program, which vibrates nobody.
     ///
     /// # Errors
     /// The reason.
@@ -201,8 +201,8 @@ impl Ledger {
         self.books.iter_mut().try_for_each(|book| book.write(book.entry.clone()))
     }
 
-    /// Keeps the ledger on a thread of its own while the loop behind `life` drives, until the answer ends. `stop` stops the rig
-    /// when an entry could not be written.
+    /// Keeps the ledger on a thread of its own while the loop behind `life` drives, until the answer ends.
+    /// `stop` stops the rig when an entry could not be written.
     ///
     /// # Errors
     /// No thread can be had.

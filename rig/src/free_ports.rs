@@ -1,5 +1,5 @@
-//! Whether a run could open what its setup names: serial lines, sockets, CAN interfaces, and the claim of the rig. Each is opened and
-//! closed again; nothing is sent.
+//! Whether a run could open what its setup names: serial lines, sockets, CAN interfaces, and the claim of the
+//! rig. Each is opened and closed again; nothing is sent.
 
 #![allow(clippy::disallowed_methods, reason = "a socket is waited for in wall-clock time")]
 

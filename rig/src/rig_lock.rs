@@ -1,8 +1,8 @@
 //! One controller a rig: a lock for each of its instruments, taken before anything is opened.
 //!
-//! The claim is of the instruments, not of a spelling of their addresses ([`drivers::identity`]), and it holds on this machine:
-//! for all its users, whatever their environment says. A controller on another machine is noticed otherwise: the amplifier
-//! then shows set-points that nobody here commanded, and the loop trips.
+//! The claim is of the instruments, not of a spelling of their addresses ([`drivers::identity`]), and it
+//! holds on this machine: for all its users, whatever their environment says. A controller on another machine
+//! is noticed otherwise: the amplifier then shows set-points that nobody here commanded, and the loop trips.
 
 use miette::WrapErr;
 use runs::files::open_plain;
@@ -12,8 +12,8 @@ use std::io::{self, Read, Write};
 use std::os::unix::fs::PermissionsExt;
 use std::path::{Path, PathBuf};
 
-/// Folders that every user of a machine may write to, and in which nobody can replace another's file. The first that is so is
-/// taken, by every user.
+/// Folders that every user of a machine may write to, and in which nobody can replace another's file. The
+/// first that is so is taken, by every user.
 const FOLDERS: [&str; 3] = ["/run/lock", "/dev/shm", "/tmp"];
 /// World-writable and sticky.
 const SHARED: u32 = 0o1777;
@@ -84,8 +84,8 @@ fn take(folder: &Path, identity: &str) -> miette::Result<File> {
     }
 }
 
-/// Opens a file that every user can open, and makes it where there is none. Nothing is followed, and nothing but a plain file
-/// is taken. Another user's may be open for reading only.
+/// Opens a file that every user can open, and makes it where there is none. Nothing is followed, and nothing
+/// but a plain file is taken. Another user's may be open for reading only.
 pub(crate) fn open_shared(path: &Path) -> io::Result<File> {
     let options = |write: bool| {
         let mut options = OpenOptions::new();

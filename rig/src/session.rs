@@ -31,8 +31,8 @@ use std::sync::mpsc::{Receiver, Sender, channel};
 use std::time::Instant;
 use writer::{Entry, Recording};
 
-/// Runs a job: in wall-clock time over its instruments, or in virtual time where the job says so. In wall-clock time `update` must
-/// wait for nothing: whoever keeps the passes calls it.
+/// Runs a job: in wall-clock time over its instruments, or in virtual time where the job says so. In
+/// wall-clock time `update` must wait for nothing: whoever keeps the passes calls it.
 ///
 /// # Errors
 /// Whatever prevents it before anything was commanded (a refusal), or a fault of this program.

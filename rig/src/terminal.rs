@@ -1,5 +1,5 @@
-//! The terminal that the program was started from: taken for single keys or for a picture, and given back whatever ends the program, but for
-//! a SIGKILL (`reset` does it then).
+//! The terminal that the program was started from: taken for single keys or for a picture, and given back
+//! whatever ends the program, but for a SIGKILL (`reset` does it then).
 #![allow(clippy::disallowed_methods, reason = "writes to a terminal beside everything else")]
 
 use runs::print;
@@ -54,8 +54,8 @@ pub fn has_keys() -> Result<(), String> {
     Ok(())
 }
 
-/// Takes the keys: without lines, without echo, and without those that would suspend or abort the program. What was typed before does not
-/// count.
+/// Takes the keys: without lines, without echo, and without those that would suspend or abort the program.
+/// What was typed before does not count.
 ///
 /// # Errors
 /// As [`has_keys`].

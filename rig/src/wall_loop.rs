@@ -165,8 +165,8 @@ impl Drop for WallLoop {
     }
 }
 
-/// Puts a command into the queue. After a pause of the caller the rows come in a burst, and so do its commands: a full queue
-/// means only that the loop has not taken them yet, as long as its heart beats.
+/// Puts a command into the queue. After a pause of the caller the rows come in a burst, and so do its
+/// commands: a full queue means only that the loop has not taken them yet, as long as its heart beats.
 fn send(commands: &CommandQueue, life: &Lifeline, clock: &Clock, rest: &dyn Fn(), command: Command) -> bool {
     let mut beat = life.heartbeat.load(Ordering::Relaxed);
     let mut since = clock.now();

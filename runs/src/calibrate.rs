@@ -148,8 +148,8 @@ pub struct Common {
     overwrite: bool,
 }
 
-/// The certificate that a calibration comes to; `bench` gives what only instruments can. Nothing is written but what the
-/// options name (a series that was taken, a phase table, a spectrum).
+/// The certificate that a calibration comes to; `bench` gives what only instruments can. Nothing is written
+/// but what the options name (a series that was taken, a phase table, a spectrum).
 ///
 /// # Errors
 /// Data that is unfit for a certificate, with the reason; files that cannot be read or written.

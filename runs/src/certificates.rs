@@ -21,8 +21,8 @@ use realtime::turn::Ports;
 use std::path::Path;
 use temperature::TemperatureRange;
 
-/// Amplitude over set-point that a drive whose set-point is an amplitude may have. A factor of two is no gain, it is a
-/// single amplitude taken for peak-to-peak.
+/// Amplitude over set-point that a drive whose set-point is an amplitude may have. A factor of two is no
+/// gain, it is a single amplitude taken for peak-to-peak.
 const PLAUSIBLE: (f64, f64) = (0.55, 1.8);
 
 /// What a setup's certificates come to.

@@ -176,8 +176,8 @@ impl Judged {
         self.scatter_p < LEVEL / 2.0
     }
 
-    /// The figures behind it in words, what decides first: the shift and the scatter about it, or, where the differences vary, from where to
-    /// where, and only then their mean.
+    /// The figures behind it in words, what decides first: the shift and the scatter about it, or, where the
+    /// differences vary, from where to where, and only then their mean.
     pub fn figures_words(&self, pairs: &[Paired]) -> [String; 2] {
         let ([low, high], conditions) = (self.shift_interval_95, pairs.len());
         let shift = format!("{:+.4}, 95 % interval {low:+.4} to {high:+.4}", self.shift);

@@ -32,8 +32,8 @@ pub fn open_plain(path: &Path, options: &mut OpenOptions) -> io::Result<File> {
     Err(io::Error::other("it is not a plain file of its own: a link, a pipe or a device stands there"))
 }
 
-/// Makes a new file, to be written beside its place. What an earlier program left under that name, or somebody planted there, loses the
-/// name and is not touched.
+/// Makes a new file, to be written beside its place. What an earlier program left under that name, or
+/// somebody planted there, loses the name and is not touched.
 pub fn fresh(path: &Path) -> io::Result<File> {
     let new = || open_plain(path, OpenOptions::new().create_new(true).read(true).write(true));
     match new() {
@@ -52,9 +52,9 @@ pub fn sync_folder_of(path: &Path) -> io::Result<()> {
     File::open(folder_of(path))?.sync_all()
 }
 
-/// Writes a file that a person named, whole or not at all: after a crash or a power cut either the old one is there or the new one.
-/// What is there and is not an ordinary file, such as a terminal or a pipe, is written to as it is. A link
-/// of this user stays a link.
+/// Writes a file that a person named, whole or not at all: after a crash or a power cut either the old one is
+/// there or the new one. What is there and is not an ordinary file, such as a terminal or a pipe, is written
+/// to as it is. A link of this user stays a link.
 ///
 /// # Errors
 /// Whatever the file system says, with the file's name; a link that another user has put there.
@@ -105,8 +105,8 @@ pub fn replaceable(path: &Path, output: &[u8]) -> miette::Result<()> {
     )
 }
 
-/// Writes a file of a run's or a study's folder, to which others may write, in the same way; a link that stands there is replaced, and what
-/// it leads to is not touched.
+/// Writes a file of a run's or a study's folder, to which others may write, in the same way; a link that
+/// stands there is replaced, and what it leads to is not touched.
 ///
 /// # Errors
 /// Whatever the file system says, with the file's name.
@@ -158,8 +158,8 @@ pub fn make_folder(path: &Path) -> miette::Result<Vec<PathBuf>> {
     Ok(made)
 }
 
-/// An open file that knows its place: another program may remove or replace it at any time, and what is then written goes
-/// nowhere.
+/// An open file that knows its place: another program may remove or replace it at any time, and what is then
+/// written goes nowhere.
 #[derive(Debug)]
 pub struct Placed {
     file: File,

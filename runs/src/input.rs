@@ -201,8 +201,8 @@ pub fn text_of(path: &Path) -> miette::Result<String> {
     String::from_utf8(bytes).map_err(|e| miette::miette!("{}: not UTF-8: {e}", path.display()))
 }
 
-/// Contents of a file that somebody named. Devices, pipes and folders are refused unread: a pipe might never say anything, a
-/// device never end.
+/// Contents of a file that somebody named. Devices, pipes and folders are refused unread: a pipe might never
+/// say anything, a device never end.
 ///
 /// # Errors
 /// A file that is not there, no ordinary file, or larger than `most` bytes.
@@ -309,8 +309,8 @@ pub fn usual(key: &str) -> [f64; 2] {
     }
 }
 
-/// Where the value of a key stands: `path` names tables and the key, for instance `["limits", "speed_max_m_s"]`.
-/// `None` where the key is not in the file (a default was used).
+/// Where the value of a key stands: `path` names tables and the key, for instance `["limits",
+/// "speed_max_m_s"]`. `None` where the key is not in the file (a default was used).
 pub fn place_of(text: &str, path: &[&str]) -> Option<Range<usize>> {
     let table = DeTable::parse(text).ok()?;
     let mut here: &DeTable<'_> = table.get_ref();

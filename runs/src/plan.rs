@@ -71,8 +71,8 @@ pub struct PlanFile {
     pub protocol: BTreeMap<String, toml::Value>,
 }
 
-/// Passes that one plan may ask for: a pass takes half a second, so this is half a day, and what a run keeps of its passes
-/// fits into memory.
+/// Passes that one plan may ask for: a pass takes half a second, so this is half a day, and what a run keeps
+/// of its passes fits into memory.
 pub const MAX_PASSES: u64 = 100_000;
 
 impl PlanFile {

@@ -3,9 +3,9 @@
 //! While a rig is driven ([`beside`]) two threads write, one for each output, and everybody else puts lines into their bounded
 //! queues: whoever keeps a pass or switches a drive off never waits for a terminal, a pipe or a pager.
 //!
-//! A reader may go away at any time (`muprime ... | head -1`), and a run must not end with it: what cannot be written is
-//! dropped. Text may come from an instrument or a file: control characters, which could rewrite what a person
-//! sees on a terminal, are shown as `\u001b` and the like; colours and line ends stay.
+//! A reader may go away at any time (`muprime ... | head -1`), and a run must not end with it: what cannot be
+//! written is dropped. Text may come from an instrument or a file: control characters, which could rewrite
+//! what a person sees on a terminal, are shown as `\u001b` and the like; colours and line ends stay.
 
 use std::borrow::Cow;
 use std::collections::VecDeque;
@@ -64,8 +64,8 @@ pub fn urgent(text: &str) {
     put(ERR, Piece::Text(format!("{text}\n")), true);
 }
 
-/// Draws something on standard error, such as a bar, where remarks are written; `line` is the line that it writes, empty where it writes
-/// none.
+/// Draws something on standard error, such as a bar, where remarks are written; `line` is the line that it
+/// writes, empty where it writes none.
 pub fn draw(line: &str, drawn: impl FnOnce() + Send + 'static) {
     let line = if line.is_empty() { String::new() } else { format!("{line}\n") };
     put(ERR, Piece::Drawn(line, Box::new(drawn)), false);
@@ -308,8 +308,8 @@ impl Write for Remarks {
 /// Columns of a line for people.
 pub const COLUMNS: usize = 80;
 
-/// The lines of a text folded between words at [`COLUMNS`]; what goes on stands so many columns further in than its line began. A word
-/// that is longer stays whole: a path can be copied.
+/// The lines of a text folded between words at [`COLUMNS`]; what goes on stands so many columns further in
+/// than its line began. A word that is longer stays whole: a path can be copied.
 pub fn folded(text: &str, hang: usize) -> String {
     let mut lines = Vec::new();
     for line in text.lines() {
@@ -346,8 +346,8 @@ fn words(line: &str) -> Vec<(usize, &str)> {
     all
 }
 
-/// Whether a character changes what is read without being seen: a control character, or a mark that turns the direction of text round,
-/// breaks a line, or has no width (but for those that join letters).
+/// Whether a character changes what is read without being seen: a control character, or a mark that turns the
+/// direction of text round, breaks a line, or has no width (but for those that join letters).
 pub fn is_hidden(c: char) -> bool {
     let mark = matches!(c, '\u{61c}' | '\u{200b}' | '\u{200e}' | '\u{200f}' | '\u{2028}'..='\u{202e}'
         | '\u{2060}' | '\u{2066}'..='\u{2069}' | '\u{feff}');

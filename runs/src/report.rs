@@ -1,5 +1,5 @@
-//! The report of a run: one self-contained HTML page. Nothing comes from elsewhere, and without JavaScript it says the same.
-//! An error of a part of a page is one of the drawing library, unless it states another.
+//! The report of a run: one self-contained HTML page. Nothing comes from elsewhere, and without JavaScript it
+//! says the same. An error of a part of a page is one of the drawing library, unless it states another.
 //!
 //! | module | part of a page |
 //! |---|---|

@@ -7,7 +7,7 @@ mod fast;
 pub mod keeper;
 mod telemetry;
 
-pub use fast::{Rehearsal, rehearse, rehearse_watched, words};
+pub use fast::{Rehearsal, rehearse, words};
 pub use keeper::{Keeper, REPLAYABLE, Replayable, TARGET, is_model, model_name, unix_ns};
 pub use telemetry::{Deadlines, Extremes, LATENESS_BOUNDS_S, Snapshot, Snapshots};
 
@@ -167,8 +167,8 @@ fn nothing_said() -> Agreement {
     Agreement::of(None, false)
 }
 
-/// Why a run that had begun did not come to an orderly end. Anything else that goes wrong is a refusal: it comes before
-/// the rig or the folder of the run is touched.
+/// Why a run that had begun did not come to an orderly end. Anything else that goes wrong is a refusal: it
+/// comes before the rig or the folder of the run is touched.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, thiserror::Error, miette::Diagnostic)]
 pub enum Unfinished {
     /// The sweep ran, and its record could not be saved.
@@ -247,8 +247,8 @@ impl Job {
     /// The passes of the plan, checked.
     ///
     /// # Errors
-    /// The values that the rig cannot do, or the first series whose expected change of force its sensor cannot
-    /// see, with their places in the plan.
+    /// The values that the rig cannot do, or the first series whose expected change of force its sensor
+    /// cannot see, with their places in the plan.
     pub fn points(&self) -> miette::Result<Vec<Point>> {
         Ok(self.points_seen(None)?.0)
     }

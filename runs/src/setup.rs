@@ -45,8 +45,8 @@ pub struct SetupFile {
     pub amplifier: InstrumentSetup,
     /// The stage.
     pub stage: InstrumentSetup,
-    /// The second switch-off channel: an output that cuts the amplifier's supply, with readback. It is proved before every
-    /// arming. A human finger, and an amplifier without a watchdog of its own, need one.
+    /// The second switch-off channel: an output that cuts the amplifier's supply, with readback. It is proved
+    /// before every arming. A human finger, and an amplifier without a watchdog of its own, need one.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub supply_relay: Option<InstrumentSetup>,
     /// Emergency stop, interlock and dead-man device, as digital inputs. A human finger needs the first and the last.
@@ -74,8 +74,8 @@ pub struct SetupFile {
     /// Certificates by path, relative to the setup file.
     #[serde(default)]
     pub certificates: Vec<PathBuf>,
-    /// Temperature at the instruments in deg C, as read at the bench: a certificate that holds within a range of
-    /// temperatures asks for it.
+    /// Temperature at the instruments in deg C, as read at the bench: a certificate that holds within a range
+    /// of temperatures asks for it.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub temperature_c: Option<f64>,
     /// Ambient pressure in Pa, where a plan does not set it.
@@ -153,8 +153,8 @@ pub struct VirtualRig {
     /// Where above zero, the fingertip is the paper's finite element ridge, by its table, on a plate that moves by so many times its stroke: 1 as
     /// it is, 2 with the paper's w as the sine's amplitude. Zero: a slider on springs.
     pub ridge_table_strokes: f64,
-    /// A hand grips the virtual dead-man device a fifth of a second after the start, and holds it: for trials with a human
-    /// finger that is none.
+    /// A hand grips the virtual dead-man device a fifth of a second after the start, and holds it: for trials
+    /// with a human finger that is none.
     pub hand_holds: bool,
 }
 

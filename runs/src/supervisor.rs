@@ -133,8 +133,8 @@ impl OffReport {
         OffReport { read_back: true, not_read_back: Vec::new() }
     }
 
-    /// From how the links were closed. A supply that was read back open switches the drive off, whatever its amplifier shows; one
-    /// that was not takes nothing from an amplifier that was read back off.
+    /// From how the links were closed. A supply that was read back open switches the drive off, whatever its
+    /// amplifier shows; one that was not takes nothing from an amplifier that was read back off.
     #[must_use]
     pub fn of(ends: &[LinkEnd]) -> Self {
         let cut = ends.iter().any(|end| end.role == Role::Supply && end.closed == Closed::ReadBackOff);

@@ -57,8 +57,8 @@ pub fn next_plan(result: &Diagnosis) -> Option<String> {
     result.report.next_experiment.iter().find(|e| !e.conditions.is_empty()).map(plan)
 }
 
-/// The plan of a designed experiment, one series a condition: those that tell most first, grouped by pressure, since
-/// a chamber is changed once.
+/// The plan of a designed experiment, one series a condition: those that tell most first, grouped by
+/// pressure, since a chamber is changed once.
 pub fn plan(experiment: &diagnosis::next::Experiment) -> String {
     let mut conditions = experiment.conditions.clone();
     let pressure = |c: &Condition| c.ambient_pressure_pa.unwrap_or(0.0);

@@ -3,17 +3,15 @@
 //! The vocabulary of faults is that of the wrappers around the loop's ports, which is PX4's: ok, off, stuck,
 //! garbage, wrong, slow, delayed, intermittent.
 
-use std::collections::VecDeque;
-
-use realtime::fault::FaultMode;
-use realtime::ports::Nanos;
-use serde::de::Error;
-use serde::{Deserialize, Deserializer, Serialize};
-
 use crate::amplifier::AmplifierStatus;
 use crate::noise::Noise;
 use crate::sensor::ForceSample;
 use crate::stage::StageStatus;
+use realtime::fault::FaultMode;
+use realtime::ports::Nanos;
+use serde::de::Error;
+use serde::{Deserialize, Deserializer, Serialize};
+use std::collections::VecDeque;
 
 /// Which instrument's channel.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]

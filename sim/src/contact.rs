@@ -1,10 +1,10 @@
 //! The contact between the fingertip's ridges and the vibrating plate, in the time domain.
 //!
 //! Three solvers, one set of parameters:
-//! * [`element`]: a massless linear element, exactly, event by event. It serves where nothing but the paper's own
-//!   assumptions acts.
-//! * [`sampled`]: a massless element with any of the [`Limit`], [`Recovery`] and [`Motion`] terms, marched through
-//!   the cycle's contact phase on a fine grid until it repeats.
+//! * [`element`]: a massless linear element, exactly, event by event. It serves where nothing but the paper's
+//!   own assumptions acts.
+//! * [`sampled`]: a massless element with any of the [`Limit`], [`Recovery`] and [`Motion`] terms, marched
+//!   through the cycle's contact phase on a fine grid until it repeats.
 //! * [`resolved`]: a ridge with mass and damping, which flies, lands and sticks; marched through many cycles.
 //!
 //! [`Contact::steady`] picks the cheapest one that holds everything requested. [`averaged`] keeps the

@@ -1,8 +1,8 @@
 //! What can be wrong with this world.
 //!
-//! A defect is a [`DefectKind`]: a name, a place, its parameters, and what it does at one of four points: to the
-//! world's set-up, to the plate's amplitude under the finger, to the contact, to the forces on their way to
-//! the sensor. Its formulae are this world's own. Where a library effect bears the same name, the cause is
+//! A defect is a [`DefectKind`]: a name, a place, its parameters, and what it does at one of four points: to
+//! the world's set-up, to the plate's amplitude under the finger, to the contact, to the forces on their way
+//! to the sensor. Its formulae are this world's own. Where a library effect bears the same name, the cause is
 //! the same and the formula another.
 //!
 //! To add one: a file in this folder with a `KIND`, and its name in the list below.

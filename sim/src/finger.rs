@@ -3,10 +3,9 @@
 //! At ultrasonic frequencies the ridges stand on an immobile backing: normal and lateral springs, perhaps
 //! with mass and damping. At the stage's pace the pad is a soft lateral spring: a reversal first unwinds it.
 
-use serde::{Deserialize, Serialize};
-
 use crate::contact::{Contact, Recovery, Ridge};
 use crate::noise::Noise;
+use serde::{Deserialize, Serialize};
 
 /// What the fingertip is.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]

@@ -1,12 +1,11 @@
 //! The plate: a resonator whose amplitude follows its drive with a time constant of `Q / (pi f)`.
 //!
-//! The envelope is a complex number in the frame that turns with the drive: `A' = (i d - 1/tau) A + A_0/tau`, with
-//! `d` the detuning in rad/s. So `|A|` settles at `A_0 / sqrt(1 + (d tau)^2)`, rings up and down with `tau`, and
-//! beats at the detuning on the way. Each step is exact for a drive that is constant over it.
-
-use std::f64::consts::PI;
+//! The envelope is a complex number in the frame that turns with the drive: `A' = (i d - 1/tau) A + A_0/tau`,
+//! with `d` the detuning in rad/s. So `|A|` settles at `A_0 / sqrt(1 + (d tau)^2)`, rings up and down with
+//! `tau`, and beats at the detuning on the way. Each step is exact for a drive that is constant over it.
 
 use serde::{Deserialize, Serialize};
+use std::f64::consts::PI;
 
 /// What the plate is.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]

@@ -1,9 +1,9 @@
 //! Sealed data sets: point tables whose cause is known to their label alone.
 //!
-//! [`generate`] makes one set from a seed and a [`Stratum`]: a design, a fingertip, perhaps a cause of a size drawn
-//! evenly in its logarithm through the limit of detection, forces from this world's own contact, and noise of
-//! its own. The set holds what a diagnoser may see (table, rig.toml, hidden conditions) apart from what only
-//! a scorer may (label and noise-free truth); [`Set::write`] puts them in two folders.
+//! [`generate`] makes one set from a seed and a [`Stratum`]: a design, a fingertip, perhaps a cause of a size
+//! drawn evenly in its logarithm through the limit of detection, forces from this world's own contact, and
+//! noise of its own. The set holds what a diagnoser may see (table, rig.toml, hidden conditions) apart from
+//! what only a scorer may (label and noise-free truth); [`Set::write`] puts them in two folders.
 //!
 //! | module | purpose |
 //! |---|---|
@@ -23,17 +23,16 @@ pub mod imitate;
 pub mod oracle;
 pub mod rough;
 
-use models::condition::Condition;
-use models::pass::Pass;
-use serde::{Deserialize, Serialize};
-
 use crate::defects::{ALL, Defect, DefectKind, Defects};
 use crate::noise::Noise;
 pub use bench::SetNoise;
 use bench::{Bench, GAP};
 use design::{Design, Planned};
 use imitate::Imitator;
+use models::condition::Condition;
+use models::pass::Pass;
 use oracle::{Case, Fit};
+use serde::{Deserialize, Serialize};
 
 /// What kind of truth a set holds.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]

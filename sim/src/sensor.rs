@@ -1,10 +1,9 @@
 //! The two-axis force sensor: cross-talk, bandwidth, noise, wander, gain, quantisation, latency, saturation,
 //! a sample counter and a clock of its own.
 
+use crate::noise::{Noise, Wander};
 use realtime::ports::Nanos;
 use serde::{Deserialize, Serialize};
-
-use crate::noise::{Noise, Wander};
 
 /// What the sensor is.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]

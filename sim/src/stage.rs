@@ -1,10 +1,9 @@
 //! The stage: slides the plate under the finger with limited acceleration and travel, and presses the finger
 //! on with a force controller of its own.
 
+use crate::noise::{Noise, Wander};
 use realtime::ports::Nanos;
 use serde::{Deserialize, Serialize};
-
-use crate::noise::{Noise, Wander};
 
 /// What the stage is.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]

@@ -4,18 +4,16 @@
 //! ports are wanted, [`VirtualRig::split`] shares the world between them behind a mutex: for threads beside
 //! the loop, not for its real-time path. Each call first moves the world to the time it is given.
 
-use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
-
+use crate::amplifier::AmplifierInput;
+use crate::sensor::ForceSample;
+use crate::stage::StageInput;
+use crate::world::{ConfigError, World, WorldConfig};
 use realtime::ports::{
     Amplifier, AmplifierState, Channel, Contact, Contacts, ForceSensor, Forces, Nanos, NoData, Quality,
     SafetyInputs, Sample, Stage, StageState, SupplyCommand, SupplyState, SupplySwitch,
 };
 use realtime::safety::{DriveCommand, StageCommand};
-
-use crate::amplifier::AmplifierInput;
-use crate::sensor::ForceSample;
-use crate::stage::StageInput;
-use crate::world::{ConfigError, World, WorldConfig};
+use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
 
 /// A world with the loop's three ports.
 pub struct VirtualRig {

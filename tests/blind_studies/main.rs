@@ -3,8 +3,8 @@
 //!
 //! `cargo run --release -p muprime-tests --example blind_studies -- same-form [SETS [SEED]]`: how often the
 //! intervals of sizes cover. `... -- further [SETS [SEED]]`: designed next experiments against random ones.
-//! `... -- sensitivity [SETS [SEED [WHICH]]]`: each constant halved and doubled; WHICH is `fit`, `decision` or
-//! the name of a constant.
+//! `... -- sensitivity [SETS [SEED [WHICH]]]`: each constant halved and doubled; WHICH is `fit`, `decision`
+//! or the name of a constant.
 
 mod further;
 mod same_form;

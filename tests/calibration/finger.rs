@@ -91,8 +91,8 @@ fn a_contact_that_is_not_coulombic_is_seen() {
     assert!(exponent + 3.0 * u < 0.0 && exponent > -0.34, "{exponent} +- {u}");
 }
 
-/// Phases of elastic skin of 28.3 MPa on twice the elements of the command with a step of its own, a deterministic scatter of
-/// about a degree and a half on each mean, as PHASES.csv has them.
+/// Phases of elastic skin of 28.3 MPa on twice the elements of the command with a step of its own, a
+/// deterministic scatter of about a degree and a half on each mean, as PHASES.csv has them.
 fn phases_csv() -> String {
     let mut text = String::from("amplitude_pp_m,phase_shift_deg,phase_shift_sd_deg,repeats,condition\n");
     // The model is run once an amplitude: by default two of them are measured twice.

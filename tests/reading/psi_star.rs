@@ -296,7 +296,9 @@ fn a_run_states_psi_star_within_what_its_conditions_give_by_hand() {
         let (name, setup) = (format!("{plan} on {setup}"), Setup::load(setup).unwrap());
         let model = Arc::new(models::prediction::SpringSlider::new(setup.tip.finger).unwrap());
         let rig = setup.file.virtual_rig.as_ref().unwrap();
-        let run = rehearse(&setup, &Plan::load(plan).unwrap(), rig.finger_seed, &rig.world(), model).unwrap();
+        let run =
+            rehearse(&setup, &Plan::load(plan).unwrap(), rig.finger_seed, &rig.world(), model, &mut |_| {})
+                .unwrap();
         assert_eq!(run.outcome, Outcome::Complete);
         let own: Passes = run
             .passes
@@ -325,7 +327,7 @@ fn a_nature_gives_the_forces_of_the_rig() {
         world.sensor.wander_sd_n = [0.0; 2];
         world.stage.load_relative_sd = 0.0;
         let model = Arc::new(models::prediction::SpringSlider::new(setup.tip.finger).unwrap());
-        let run = rehearse(&setup, &plan, FIRST_SEED, &world, model).unwrap();
+        let run = rehearse(&setup, &plan, FIRST_SEED, &world, model, &mut |_| {}).unwrap();
         for pass in &run.passes {
             let c = pass.pass.condition(1.0);
             let (force, law) = (pass.pass.friction_force_n().unwrap(), nature.force_n(&c));

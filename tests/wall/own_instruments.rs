@@ -2,8 +2,8 @@
 //! Python that shares nothing with ours (`tests/peers/own/`): looked at by `doctor`, thirty passes of a sweep, and faults of the wire
 //! while the plate is driven. `docs/own-instruments.md` holds the table of the faults.
 //!
-//! Every fault: `MUPRIME_OWN_CAMPAIGN=1 cargo test --release -p muprime-tests-wall --test own_instruments -- --nocapture`; otherwise two
-//! of each instrument.
+//! Every fault: `MUPRIME_OWN_CAMPAIGN=1 cargo test --release -p muprime-tests-wall --test own_instruments --
+//! --nocapture`; otherwise two of each instrument.
 
 #[path = "own/rows.rs"]
 mod rows;

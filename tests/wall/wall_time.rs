@@ -170,9 +170,9 @@ pub fn in_wall_clock_time<T: FnOnce()>(test: T) {
 
 /// Runs a sweep in wall-clock time to its end, in a fresh folder for every attempt.
 ///
-/// A trip is accepted only if the monitor recorded a stall of the machine in the 300 ms before it, and at most
-/// four times; any other trip fails. What ends otherwise is the caller's to judge. `sweep` makes the command
-/// for a folder. Returns the folder and output of the attempt that went through.
+/// A trip is accepted only if the monitor recorded a stall of the machine in the 300 ms before it, and at
+/// most four times; any other trip fails. What ends otherwise is the caller's to judge. `sweep` makes the
+/// command for a folder. Returns the folder and output of the attempt that went through.
 pub fn sweep_unless_the_machine_stalls(folder: &Path, sweep: impl Fn(&Path) -> Command) -> (PathBuf, Output) {
     for attempt in 1..=5 {
         let out = folder.join(format!("attempt-{attempt}"));

@@ -1,7 +1,7 @@
 //! Amplitude over position: the nodal pattern of the plate.
 //!
-//! `w = w0 (1 - d + d |cos(2 pi (x - x0) / lambda)|)`: a standing wave with share `d`, on top of what travels and
-//! leaves no node. `d = 1` is the pattern of physics.md 4.14.
+//! `w = w0 (1 - d + d |cos(2 pi (x - x0) / lambda)|)`: a standing wave with share `d`, on top of what travels
+//! and leaves no node. `d = 1` is the pattern of physics.md 4.14.
 
 use super::{AmplitudeError, AmplitudePoint, check, relative_scatter};
 use crate::regression::nonlinear::{Scatter, fit};

@@ -20,8 +20,8 @@ pub struct Args {
     /// Write the sets to this folder (open and sealed parts apart) for other diagnosers; none is scored.
     #[arg(long, value_name = "DIR")]
     pub write: Option<std::path::PathBuf>,
-    /// Instead: sets whose scatter is not what rig.toml states: gaussian, heavy, serial, gross, understated, runs, or all; so
-    /// many of each truth (none, a squeeze film, friction that depends on load, an offset).
+    /// Instead: sets whose scatter is not what rig.toml states: gaussian, heavy, serial, gross, understated,
+    /// runs, or all; so many of each truth (none, a squeeze film, friction that depends on load, an offset).
     #[arg(long, value_name = "KIND", conflicts_with_all = ["write", "stratum"])]
     pub noise: Option<String>,
     /// Instead: the table of constants, as docs/diagnosis/constants.md has it.

@@ -7,8 +7,8 @@ use tables::check::{Good, On, kind_of, problems_of};
 
 #[derive(Debug, clap::Args)]
 pub struct Args {
-    /// Files of any kind, folders of runs, or bundled names: plans, setups, profiles, fingertips, rig.toml, point tables, models,
-    /// certificates, defects, verdicts, summaries, records
+    /// Files of any kind, folders of runs, or bundled names: plans, setups, profiles, fingertips, rig.toml,
+    /// point tables, models, certificates, defects, verdicts, summaries, records
     #[arg(required = true)]
     files: Vec<String>,
     /// Setup that the plans are to run on [default: the setup among the files, where there is one]

@@ -18,8 +18,8 @@ fn help_of(path: &str, has_subcommands: bool) -> Option<String> {
     (!lines.is_empty()).then(|| format!("{head}\n{}", lines.join("\n")))
 }
 
-/// A command line as a shell takes it within the columns of a page: broken between its words with a backslash, and within quotes as it is,
-/// which the map of an import does not mind.
+/// A command line as a shell takes it within the columns of a page: broken between its words with a
+/// backslash, and within quotes as it is, which the map of an import does not mind.
 fn broken(line: &str) -> String {
     let (mut shown, mut now, mut quoted) = (String::new(), String::from("  "), false);
     for word in line.split(' ') {

@@ -15,8 +15,8 @@ use tables::import::{Cut, Grid, Imported, Marks, Wanted, guessed_lines, import, 
 pub struct Args {
     /// The table: delimited text, Excel or OpenDocument, Parquet, NumPy
     file: PathBuf,
-    /// What is what: HEADER=TARGET:UNIT, separated by commas; may be repeated; docs/reference.md lists targets and units [default: guessed
-    /// from the headers and shown]
+    /// What is what: HEADER=TARGET:UNIT, separated by commas; may be repeated; docs/reference.md lists
+    /// targets and units [default: guessed from the headers and shown]
     #[arg(long)]
     map: Vec<String>,
     /// Constants for what has no column: NAME=VALUE[:UNIT], separated by commas; may be repeated

@@ -29,8 +29,8 @@ struct Found {
     holds: bool,
 }
 
-/// Runs every cycle of every record of a run again, and compares its decisions with those recorded, bit for bit. It holds only
-/// where the record is whole: of what is missing nothing is known.
+/// Runs every cycle of every record of a run again, and compares its decisions with those recorded, bit for
+/// bit. It holds only where the record is whole: of what is missing nothing is known.
 ///
 /// # Errors
 /// A record that cannot be read, or that lacks what a replay needs.

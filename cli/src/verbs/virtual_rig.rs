@@ -29,9 +29,9 @@ pub struct Args {
     /// Serial line of the setup's instrument of text
     #[arg(long, value_name = "PATH")]
     serial: Option<String>,
-    /// Take an operator's hands from the standard input, to calibrate the virtual rig: `hang LATERAL_N NORMAL_N`
-    /// puts dead weights on the force sensor, `look` reads the plate's motion off a vibrometer, and the
-    /// instruments' own lamps; one JSON line each
+    /// Take an operator's hands from the standard input, to calibrate the virtual rig: `hang LATERAL_N
+    /// NORMAL_N` puts dead weights on the force sensor, `look` reads the plate's motion off a vibrometer, and
+    /// the instruments' own lamps; one JSON line each
     #[arg(long)]
     hands: bool,
     /// Defects in place of the bundled ones

@@ -1,5 +1,5 @@
-//! CAN frames, and the line protocol of serial CAN adapters (slcan, after Lawicel).
-//! Signals in a frame, multiplexed ones too: `dbc`; their keys `schema/frames`, their check `profile/compile`.
+//! CAN frames, and the line protocol of serial CAN adapters (slcan, after Lawicel). Signals in a frame,
+//! multiplexed ones too: `dbc`; their keys `schema/frames`, their check `profile/compile`.
 
 /// A data frame of classic CAN.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]

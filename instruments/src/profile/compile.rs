@@ -1,9 +1,5 @@
 //! From a description to a profile: names become indices, and every refusal names its place.
 
-use std::collections::HashMap;
-use std::fmt::Display;
-use std::ops::Range;
-
 use super::{
     CompiledSet, CompiledSignal, Frame, FrameId, FrameKind, Part, Place, Profile, SetId, SignalId, Span,
 };
@@ -15,6 +11,9 @@ use crate::error::ProfileError;
 use crate::expression::Expression;
 use crate::field::{ByteOrder, Field, NumberType};
 use crate::schema::{Description, Message, Poll};
+use std::collections::HashMap;
+use std::fmt::Display;
+use std::ops::Range;
 
 /// Gives the text of another file by its name.
 type Files<'a> = &'a dyn Fn(&str) -> Option<String>;

@@ -1,11 +1,10 @@
 //! What goes over the link: `[[poll]]`, `[stream]`, `[[message]]`, `[[query]]`, `[[init]]`, `[[write]]`.
 
+use crate::codec::checksum::Check;
+use crate::codec::stream::Shape;
 use schemars::JsonSchema;
 use serde::Deserialize;
 use toml::Spanned;
-
-use crate::codec::checksum::Check;
-use crate::codec::stream::Shape;
 
 /// Tables of Modbus registers. A coil or a discrete input counts as a register whose value is 0 or 1.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default, Deserialize, JsonSchema)]

@@ -1,9 +1,8 @@
 //! What tries a profile: `[emulator]` and `[[vector]]`.
 
-use std::collections::BTreeMap;
-
 use schemars::JsonSchema;
 use serde::Deserialize;
+use std::collections::BTreeMap;
 use toml::Spanned;
 
 /// `[emulator]`: what the emulator answers.

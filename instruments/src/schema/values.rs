@@ -1,10 +1,9 @@
 //! The numbers in the frames: `[[signal]]` and `[[set]]`, with their units.
 
+use crate::field::{ByteOrder, NumberType};
 use schemars::JsonSchema;
 use serde::Deserialize;
 use toml::Spanned;
-
-use crate::field::{ByteOrder, NumberType};
 
 /// `[[signal]]`: one number that the instrument gives.
 #[derive(Debug, Clone, Deserialize, JsonSchema)]

@@ -5,9 +5,9 @@
 //! gross contact is Hertz's or because the ridges are of different heights. The finger's mu' is the mean of theirs by load. That is a mean
 //! field: waves from ridge to ridge are left out.
 //!
-//! **Finite length** ([`plane_stress`]). A ridge as long as it is wide lies between plane strain and plane stress. In the plane both
-//! are one problem with other constants, `nu' = nu / (1 + nu)` and `E' = E (1 + 2 nu) / (1 + nu)^2`
-//! (Timoshenko and Goodier), so the same run gives the other end.
+//! **Finite length** ([`plane_stress`]). A ridge as long as it is wide lies between plane strain and plane
+//! stress. In the plane both are one problem with other constants, `nu' = nu / (1 + nu)` and `E' = E (1 + 2
+//! nu) / (1 + nu)^2` (Timoshenko and Goodier), so the same run gives the other end.
 
 use super::{RidgeCase, RidgeError, RunSettings, run};
 

@@ -1,10 +1,10 @@
 //! The amplitude for a wanted friction, sought in the contact angle instead of the amplitude.
 //!
-//! With instant recovery the half contact angle `alpha` gives the amplitude in closed form (Eq. 15,
-//! `a = pi h / A` with `A = sin(alpha) - alpha cos(alpha)`), the growth of the stretch `kappa = K A`, and
-//! with the phase of slip `mu'` and its slope. Force is continuous where stick ends, so `mu'` does not change with
-//! that phase to first order. For short contact all of it is
-//! `mu' = 1 - (1 - q)^3` with `q = K alpha^2 / 3`: in `ln q` and `ln alpha` a line, where Newton's method begins.
+//! With instant recovery the half contact angle `alpha` gives the amplitude in closed form (Eq. 15, `a = pi h
+//! / A` with `A = sin(alpha) - alpha cos(alpha)`), the growth of the stretch `kappa = K A`, and with the
+//! phase of slip `mu'` and its slope. Force is continuous where stick ends, so `mu'` does not change with
+//! that phase to first order. For short contact all of it is `mu' = 1 - (1 - q)^3` with `q = K alpha^2 / 3`:
+//! in `ln q` and `ln alpha` a line, where Newton's method begins.
 
 use super::{contact_area, static_compression_m};
 use crate::condition::Condition;

@@ -40,8 +40,8 @@ pub fn ask_for_real_time(priority: i32) -> Grants {
     let mut grants = Grants::default();
     let refused = || std::io::Error::last_os_error().to_string();
     let wanted = libc::sched_param { sched_priority: priority };
-    // SAFETY: plain calls on the calling thread (pid 0) with a valid parameter struct. SCHED_RESET_ON_FORK keeps
-    // threads that are spawned later from inheriting the class.
+    // SAFETY: plain calls on the calling thread (pid 0) with a valid parameter struct. SCHED_RESET_ON_FORK
+    // keeps threads that are spawned later from inheriting the class.
     let got = unsafe { libc::sched_setscheduler(0, libc::SCHED_FIFO | libc::SCHED_RESET_ON_FORK, &wanted) };
     if got != 0 {
         grants.policy_refused = Some(refused());
@@ -102,8 +102,8 @@ pub(super) fn pin_to(cpu: usize) -> std::io::Result<Vec<usize>> {
     if cpu >= libc::CPU_SETSIZE as usize {
         return Err(std::io::Error::from_raw_os_error(libc::EINVAL));
     }
-    // SAFETY: `set` is plain data, valid when zeroed; CPU_SET stays inside it by the check above; both calls concern the
-    // calling thread (pid 0) and a set of the size given.
+    // SAFETY: `set` is plain data, valid when zeroed; CPU_SET stays inside it by the check above; both calls
+    // concern the calling thread (pid 0) and a set of the size given.
     unsafe {
         let mut set: libc::cpu_set_t = std::mem::zeroed();
         libc::CPU_SET(cpu, &mut set);

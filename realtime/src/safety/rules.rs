@@ -375,8 +375,8 @@ fn echo(c: &Context<'_>) -> Option<(f64, f64, Unit)> {
     }
     let frequency = state.echoed_frequency_hz;
     let off = (frequency - c.watch.commanded_hz).abs() > 1.0 + 1e-4 * frequency;
-    // Another master's 'off' is no harm, but it is another master's; and what is measured then is a plate at rest.
-    // One that is commanded off in between may still show it.
+    // Another master's 'off' is no harm, but it is another master's; and what is measured then is a plate at
+    // rest. One that is commanded off in between may still show it.
     let on = low > 0.0 || modulated.is_none();
     let switched = (on && !state.output_on).then_some((0.0, 1.0, Unit::Flag));
     off.then_some((frequency, c.watch.commanded_hz, Unit::Hertz)).or(switched)

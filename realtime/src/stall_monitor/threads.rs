@@ -78,8 +78,8 @@ fn watch(cpu: usize, origin_ns: u64, end: &AtomicBool) -> StallReport {
 
 /// Binds the calling thread to a CPU. Where that is not allowed the thread still sees what happens to it.
 fn bind_to(cpu: usize) {
-    // SAFETY: `set` is plain data, valid when zeroed; CPU_SET stays inside it as `cpu` is below CPUS; the call reads
-    // it for the calling thread (pid 0) only.
+    // SAFETY: `set` is plain data, valid when zeroed; CPU_SET stays inside it as `cpu` is below CPUS; the
+    // call reads it for the calling thread (pid 0) only.
     unsafe {
         let mut set: libc::cpu_set_t = std::mem::zeroed();
         libc::CPU_SET(cpu, &mut set);

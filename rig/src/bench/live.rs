@@ -1,5 +1,5 @@
-//! A vibrometer's table taken live: set-points driven on the amplifier, the velocity's amplitude read off, the range read
-//! back from the vibrometer's controller.
+//! A vibrometer's table taken live: set-points driven on the amplifier, the velocity's amplitude read off,
+//! the range read back from the vibrometer's controller.
 //!
 //! The drive goes through the same loop with the same safety rules as a sweep; the finger is lifted and the stage stands.
 //! What stands in this file is only the order of the set-points and the questions. The velocity is a voltage that a
@@ -26,8 +26,8 @@ const LOOK_EVERY: Duration = Duration::from_millis(20);
 /// Drives the set-points and asks for the readings; the table as CSV, with the settings at its head.
 ///
 /// # Errors
-/// A setup without a vibrometer, a rig that does not connect or will not stay armed, set-points beyond its limits, an
-/// input that ends early, settings that were changed meanwhile.
+/// A setup without a vibrometer, a rig that does not connect or will not stay armed, set-points beyond its
+/// limits, an input that ends early, settings that were changed meanwhile.
 pub fn table(setup: &Setup, table: &LiveTable<'_>) -> miette::Result<String> {
     check(setup, table)?;
     let settings = super::vibrometer(setup, table.frequency_hz)?;

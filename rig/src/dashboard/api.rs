@@ -172,8 +172,8 @@ struct WindowS {
     to_s: f64,
 }
 
-/// The recorded cycles of a window, as finely as a screen shows them. One window is read at a time: the record
-/// of hours is long.
+/// The recorded cycles of a window, as finely as a screen shows them. One window is read at a time: the
+/// record of hours is long.
 async fn cycles(
     State(shared): State<Arc<Shared>>,
     Path(name): Path<String>,

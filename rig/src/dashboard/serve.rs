@@ -18,8 +18,8 @@ const TAKEN_WITHIN: Duration = Duration::from_secs(5);
 const WHOLE_WITHIN: Duration = Duration::from_secs(30);
 const LAST_ANSWER_WITHIN: Duration = Duration::from_secs(10);
 const HEAD_BYTES: usize = 16 * 1024;
-/// What the system may hold for one that reads slowly, in bytes (it takes twice as much): with its own bound of some megabytes a slow
-/// page would show what was minutes ago, and states could not be left out for it.
+/// What the system may hold for one that reads slowly, in bytes (it takes twice as much): with its own bound
+/// of some megabytes a slow page would show what was minutes ago, and states could not be left out for it.
 const HELD_BYTES: usize = 32 * 1024;
 /// Time from one try to the next where the system has no descriptor to give.
 const AGAIN: Duration = Duration::from_millis(100);

@@ -382,8 +382,8 @@ fn arming(look: &Look) -> Finding {
     }
 }
 
-/// Whether a normal force at rest is one that spoils the `least` load, in N. A dead weight may stand on the finger: nothing but a
-/// hand lifts it.
+/// Whether a normal force at rest is one that spoils the `least` load, in N. A dead weight may stand on the
+/// finger: nothing but a hand lifts it.
 fn is_loaded(rest_n: f64, weight_n: f64, least_n: f64) -> bool {
     rest_n.abs().min((rest_n - weight_n).abs()) > 0.5 * least_n
 }

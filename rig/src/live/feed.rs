@@ -49,8 +49,8 @@ struct Open {
 }
 
 impl Feed {
-    /// A feed of a run and the passes that earlier sessions made of it; what viewers ask goes into `signals`. Nothing is opened yet: the
-    /// run's folder may still have to be made.
+    /// A feed of a run and the passes that earlier sessions made of it; what viewers ask goes into `signals`.
+    /// Nothing is opened yet: the run's folder may still have to be made.
     pub fn new(run: Run, before: Vec<MeasuredPass>, signals: &Signals) -> Self {
         let signals = signals.clone();
         Feed { run, signals, before, open: None, now_s: 0.0, lost: 0, refused: false }

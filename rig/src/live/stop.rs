@@ -19,8 +19,8 @@ const LOOK_EVERY: Duration = Duration::from_millis(50);
 /// Processes that were sent a SIGINT from here, each for a run: a second one would end them before their drive is read back off.
 static SIGNALLED: Mutex<BTreeSet<(u32, PathBuf)>> = Mutex::new(BTreeSet::new());
 
-/// Stops the run in a folder: by its feed, and by SIGINT to the process that holds its lock where the run does not show it. Returns
-/// what shows it.
+/// Stops the run in a folder: by its feed, and by SIGINT to the process that holds its lock where the run
+/// does not show it. Returns what shows it.
 ///
 /// # Errors
 /// It is not shown that the run stops; with what was tried.

@@ -1,5 +1,5 @@
-//! The page: what stands where. Eighty columns and twenty-four rows hold everything; more room goes to the curve, the traces and the
-//! events, less room keeps what is needed first.
+//! The page: what stands where. Eighty columns and twenty-four rows hold everything; more room goes to the
+//! curve, the traces and the events, less room keeps what is needed first.
 
 use super::numbers::{duration, of_state, phase, plain};
 use super::plot::{curve, trace};

@@ -10,8 +10,8 @@ use std::path::PathBuf;
 /// Arguments.
 #[derive(Debug, clap::Args)]
 pub struct Args {
-    /// Calibrated forces at each tilt, as CSV: tilt_rad (about the axis across the stroke, positive where the lateral
-    /// share of gravity grows), lateral_force_n, normal_force_n (zeros not taken off)
+    /// Calibrated forces at each tilt, as CSV: tilt_rad (about the axis across the stroke, positive where the
+    /// lateral share of gravity grows), lateral_force_n, normal_force_n (zeros not taken off)
     tilts: PathBuf,
     #[command(flatten)]
     common: Common,

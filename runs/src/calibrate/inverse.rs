@@ -1,6 +1,6 @@
-//! The inverse analysis behind `calibrate finger PHASES.csv`: the ridge is run at the table's amplitudes, first
-//! over the whole range of moduli as elastic skin, then about what was found with penalty and retardation time
-//! free as well.
+//! The inverse analysis behind `calibrate finger PHASES.csv`: the ridge is run at the table's amplitudes,
+//! first over the whole range of moduli as elastic skin, then about what was found with penalty and
+//! retardation time free as well.
 
 use crate::say;
 use calibration::identify::skin::{IdentifiedSkin, identify_skin};

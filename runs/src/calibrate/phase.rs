@@ -14,8 +14,8 @@ use std::path::PathBuf;
 /// Arguments.
 #[derive(Debug, clap::Args)]
 pub struct Args {
-    /// Waveforms, one file an acquisition, as CSV: plate_v, skin_v. Repeats of one amplitude are recognised by
-    /// the plate's amplitude (within --same)
+    /// Waveforms, one file an acquisition, as CSV: plate_v, skin_v. Repeats of one amplitude are recognised
+    /// by the plate's amplitude (within --same)
     #[arg(required = true)]
     waveforms: Vec<PathBuf>,
     /// Sample rate of the digitiser
@@ -24,8 +24,8 @@ pub struct Args {
     /// Frequency of the drive
     #[arg(long, default_value_t = 27_500.0)]
     frequency_hz: f64,
-    /// Setup with a [vibrometer]: range and delay of the decoder are read back from it, for plate and skin, where the
-    /// four flags below do not state them
+    /// Setup with a [vibrometer]: range and delay of the decoder are read back from it, for plate and skin,
+    /// where the four flags below do not state them
     #[arg(long)]
     setup: Option<String>,
     /// Range of the plate's decoder, as the controller says it [default: read back, or 125mm/s/V]

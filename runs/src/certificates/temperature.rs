@@ -1,9 +1,9 @@
 //! Temperature ranges of certificates, held against what the instruments report while the rig runs.
 //!
-//! The check when a setup is read knows only the temperature that somebody read off at the bench. Here the amplifier's
-//! own channel (its own or the plate's temperature) is looked at when a pass begins to be measured: outside the
-//! certificate's range the pass carries a flag. Nothing is corrected and nothing stops; the reader of the table decides.
-//! It runs beside the loop, on the rows that it leaves.
+//! The check when a setup is read knows only the temperature that somebody read off at the bench. Here the
+//! amplifier's own channel (its own or the plate's temperature) is looked at when a pass begins to be
+//! measured: outside the certificate's range the pass carries a flag. Nothing is corrected and nothing stops;
+//! the reader of the table decides. It runs beside the loop, on the rows that it leaves.
 
 use realtime::ports::{Channel, NoData};
 use serde::{Deserialize, Serialize};

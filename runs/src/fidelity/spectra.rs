@@ -44,8 +44,8 @@ pub(super) struct Spectra {
     late: usize,
 }
 
-/// Segments of a pass at least: of a target of a few lines, and of a broad one, whose neighbouring lines must not
-/// hold their phases from segment to segment. As many bins make a target broad.
+/// Segments of a pass at least: of a target of a few lines, and of a broad one, whose neighbouring lines must
+/// not hold their phases from segment to segment. As many bins make a target broad.
 pub(super) const SEGMENTS: [usize; 2] = [3, 15];
 pub(super) const BROAD: usize = 24;
 /// Samples of a segment at least and at most.
@@ -70,9 +70,9 @@ impl Spectra {
         Spectra { length, cycle_s, window, sums: vec![[0.0; 4]; length / 2 - 1], segments: 0.0, late: 0 }
     }
 
-    /// Takes the two series of a pass. The measured one comes `late` samples later: they are aligned first, since a
-    /// delay within a segment pulls the gain between neighbouring lines (Bendat and Piersol, section 9.3.2); the phase
-    /// has the delay.
+    /// Takes the two series of a pass. The measured one comes `late` samples later: they are aligned first,
+    /// since a delay within a segment pulls the gain between neighbouring lines (Bendat and Piersol, section
+    /// 9.3.2); the phase has the delay.
     pub fn add(&mut self, wanted: &[f64], measured: &[f64], late: usize) {
         let n = self.length;
         self.late = late;

@@ -68,8 +68,8 @@ impl Plan {
     /// The passes in the order of measurement.
     ///
     /// # Errors
-    /// Every value beyond a limit, or else the first pass that needs more travel than there is, with its place in the file. Nothing
-    /// has moved.
+    /// Every value beyond a limit, or else the first pass that needs more travel than there is, with its
+    /// place in the file. Nothing has moved.
     pub fn points(&self, seed: u64, limits: &Limits, resolution: &Resolution) -> miette::Result<Vec<Point>> {
         let mut wrong = Problems::of(&self.origin, &self.text);
         let allows = |c: &Covariate| Some((allowed(c, limits), "this rig allows".to_string()));

@@ -1,5 +1,5 @@
-//! One self-contained HTML page of a verdict: what was measured and what the models say, where the gap lies, which cause, how far it
-//! shrinks, what is uncertain, what to do next.
+//! One self-contained HTML page of a verdict: what was measured and what the models say, where the gap lies,
+//! which cause, how far it shrinks, what is uncertain, what to do next.
 
 mod causes;
 mod gap_map;

@@ -1,5 +1,5 @@
-//! The part of a run's page that is worked with: the script, the library that draws, and the data, all in the page itself. Without JavaScript it
-//! stays hidden, and the figures below say the same.
+//! The part of a run's page that is worked with: the script, the library that draws, and the data, all in the
+//! page itself. Without JavaScript it stays hidden, and the figures below say the same.
 
 use super::RunData;
 use super::events::describe;

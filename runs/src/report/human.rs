@@ -55,8 +55,8 @@ pub fn to_its_uncertainty(value: f64, sd: f64) -> String {
     format!("{value:.digits$}")
 }
 
-/// A value with its interval and unit, in one scale: `0.0766 [0.05, 0.11] 1/um²`. Units that are not listed stay as they are, and a
-/// pure number has none.
+/// A value with its interval and unit, in one scale: `0.0766 [0.05, 0.11] 1/um²`. Units that are not listed
+/// stay as they are, and a pure number has none.
 pub fn with_interval(value: f64, [low, high]: [f64; 2], unit: &str) -> String {
     let largest = value.abs().max(low.abs()).max(high.abs());
     // Beside its interval a value below a thousandth of it is zero.

@@ -225,8 +225,7 @@ pub enum Outcome {
     },
     /// Nothing was heard of the loop.
     LoopLost,
-    /// Record, passes, summary or report could not be written: a measurement that is not stored is
-    /// not made.
+    /// Record, passes, summary or report could not be written: a measurement that is not stored is not made.
     RecordLost,
     /// What the finger was exposed to could not be written in time: nothing is driven that is not counted.
     /// What was measured is stored.

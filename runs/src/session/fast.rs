@@ -156,24 +156,11 @@ pub struct Rehearsal {
 }
 
 /// Runs a plan on a world in virtual time and keeps nothing: for statistics, and to see beforehand what a plan shows.
+/// `each` takes every row.
 ///
 /// # Errors
 /// A plan that the limits do not allow, or a world that cannot be.
 pub fn rehearse(
-    setup: &Setup,
-    plan: &Plan,
-    seed: u64,
-    world: &sim::world::WorldConfig,
-    model: Arc<dyn FrictionModel>,
-) -> miette::Result<Rehearsal> {
-    rehearse_watched(setup, plan, seed, world, model, &mut |_| {})
-}
-
-/// The same; `each` takes every row.
-///
-/// # Errors
-/// As [`rehearse`].
-pub fn rehearse_watched(
     setup: &Setup,
     plan: &Plan,
     seed: u64,

@@ -1,5 +1,5 @@
-//! Snapshots of the loop for viewers: one cycle in a hundred milliseconds, and the extremes of all cycles, so that a spike
-//! between two snapshots is seen.
+//! Snapshots of the loop for viewers: one cycle in a hundred milliseconds, and the extremes of all cycles, so
+//! that a spike between two snapshots is seen.
 
 use realtime::ports::{Channel, Nanos};
 use realtime::turn::Row;

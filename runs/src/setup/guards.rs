@@ -1,7 +1,7 @@
 //! Who touches the plate, what a person's finger needs, and what a setup says twice.
 //!
-//! Each fact is stated in one place: who touches the plate by the fingertip's kind, what an instrument has by its profile. A key
-//! that says something else is refused: the harmless one of two statements never wins.
+//! Each fact is stated in one place: who touches the plate by the fingertip's kind, what an instrument has by
+//! its profile. A key that says something else is refused: the harmless one of two statements never wins.
 
 use super::SetupFile;
 use crate::fingertip::{Fingertip, FingertipKind};
@@ -10,8 +10,8 @@ use drivers::InstrumentSetup;
 use instruments::Profile;
 use std::net::SocketAddr;
 
-/// Whether a person's finger is on the plate, so that its guards apply. A virtual rig vibrates nobody: there `human_contact` asks
-/// for a rehearsal of the guards.
+/// Whether a person's finger is on the plate, so that its guards apply. A virtual rig vibrates nobody: there
+/// `human_contact` asks for a rehearsal of the guards.
 pub(super) fn person(file: &SetupFile, tip: Option<&Fingertip>) -> bool {
     let human = tip.is_some_and(|tip| tip.kind == FingertipKind::Human);
     let rehearsed = file.limits.human_contact == Some(true);

@@ -45,8 +45,8 @@ pub struct LimitsFile {
     /// Equal raw amplitudes in a row that are a frozen readback: 20 to 1000, while driven. Default: 200 where
     /// the profile states the readback's noise.
     pub amplitude_frozen_after: Option<u32>,
-    /// The fingertip says whether a human finger is in the rig; a statement against it is refused. `true` on a virtual rig with
-    /// a human fingertip: its guards are rehearsed. Default: by the fingertip.
+    /// The fingertip says whether a human finger is in the rig; a statement against it is refused. `true` on
+    /// a virtual rig with a human fingertip: its guards are rehearsed. Default: by the fingertip.
     pub human_contact: Option<bool>,
     /// A key held at the terminal stands for a dead-man device: for trials. Default: false.
     pub dead_man_key: Option<bool>,
@@ -192,8 +192,8 @@ fn of(file: &SetupFile, person: bool, cycle: Nanos) -> Result<Limits, LimitError
     }
     limits.timing.command_expiry = Timing::longest_expiry(cycle);
 
-    // A channel is stale after a number of its own periods, never of the loop's cycles. On a general-purpose kernel a
-    // link thread may be held up for some milliseconds: the latency allows for that and is stated.
+    // A channel is stale after a number of its own periods, never of the loop's cycles. On a general-purpose
+    // kernel a link thread may be held up for some milliseconds: the latency allows for that and is stated.
     let stall = l.link_stall_s.unwrap_or(LINK_STALL_S);
     if !(0.0..=LINK_STALL_MAX_S).contains(&stall) {
         let needed = "from 0 to 0.05: an amplifier's own watchdog waits no longer";

@@ -151,8 +151,7 @@ fn share_lines(all: &[(&'static str, &InstrumentSetup)]) -> Result<(), Problem> 
         let kind = instrument.description().ok()?.description.link.kind;
         let over_rtu = instrument.address.starts_with("rtu:");
         let serial = over_rtu || matches!(kind, LinkKind::ModbusRtu | LinkKind::Serial);
-        // Each `pty` is a line of its own.
-        // A line that is not plugged in is one line all the same.
+        // Each `pty` is a line of its own. A line that is not plugged in is one line all the same.
         let path =
             Some(path).filter(|path| serial && *path != "pty" && !instrument.address.starts_with("tcp:"))?;
         let path = std::fs::canonicalize(path).unwrap_or_else(|_| path.into());

@@ -5,10 +5,9 @@
 //! a step need only be short against the landing. With a stiff skin and full loss this is the rigid landing
 //! of [`super::resolved`]; without loss a ridge bounces, and its friction falls much further.
 
-use std::f64::consts::PI;
-
 use super::Contact;
 use super::resolved::{Cycle, LIGHTEST_KG, March, Sums, transition};
+use std::f64::consts::PI;
 
 impl March {
     /// One period over a compliant skin, from the plate's top; then the static compression is corrected.

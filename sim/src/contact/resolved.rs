@@ -7,10 +7,9 @@
 //! because the massless lateral spring cannot pass it on. The static compression `d` is adjusted from cycle
 //! to cycle until the mean normal force is the one the finger presses with.
 
-use std::f64::consts::PI;
-
 use super::lateral::Lateral;
 use super::{Contact, Steady, element};
+use std::f64::consts::PI;
 
 /// How finely and how long to march.
 #[derive(Clone, Copy, Debug, PartialEq)]

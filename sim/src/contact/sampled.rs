@@ -5,10 +5,9 @@
 //! touch-down does; the map from one touch-down to the next never falls and never rises faster than its
 //! argument, so its fixed point is found by bisection where plain repetition is slow.
 
-use std::f64::consts::PI;
-
 use super::lateral::Lateral;
 use super::{Contact, HEIGHTS, Motion, Recovery, Steady, element};
+use std::f64::consts::PI;
 
 /// Steps over the contact phase of a pure sine.
 const CONTACT_STEPS: usize = 320;

@@ -4,11 +4,10 @@
 //! is given holds). A `[[channel]]` has a `channel` (force, amplifier, stage), a `fault` (ok, off, stuck,
 //! garbage, wrong, slow, delayed, intermittent), and may have `from_s`, `until_s` and a `strength`.
 
-use serde::Deserialize;
-
 use super::{Defect, DefectKind, Values};
 use crate::channel::ChannelFault;
 use crate::noise::Noise;
+use serde::Deserialize;
 
 /// The defects of one world.
 #[derive(Clone, Debug, Default, PartialEq)]

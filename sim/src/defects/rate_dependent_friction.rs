@@ -1,7 +1,7 @@
 //! Friction that depends on the sliding speed as a thermally activated process does (Eyring): by asinh(U/U0),
-//! linear below U0 and logarithmic above, and falls again as fast sliding warms the bonds. A bond lasts as long
-//! as a junction takes to pass, so U0 goes with its width: less than the cube root of the load (Hertz), as
-//! there are more junctions too. Unchanged at 20 mm/s and 0.3 N.
+//! linear below U0 and logarithmic above, and falls again as fast sliding warms the bonds. A bond lasts as
+//! long as a junction takes to pass, so U0 goes with its width: less than the cube root of the load (Hertz),
+//! as there are more junctions too. Unchanged at 20 mm/s and 0.3 N.
 
 use super::*;
 

@@ -1,16 +1,15 @@
 //! The bench of one sealed set: its fingertip, its noise, its causes' sizes, its measurement.
 
-use models::pass::Pass;
-use models::quantity::PeakToPeak;
-use models::rig_file::{Calibration, PassNoise, RigFile};
-use serde::{Deserialize, Serialize};
-
 use super::design::Planned;
 use super::oracle::Case;
 use crate::defects::{Defect, DefectKind, Defects, Surroundings};
 use crate::finger::{Finger, FingerConfig};
 use crate::noise::Noise;
 use crate::world::{Point, steady_forces};
+use models::pass::Pass;
+use models::quantity::PeakToPeak;
+use models::rig_file::{Calibration, PassNoise, RigFile};
+use serde::{Deserialize, Serialize};
 
 /// The noise of a set's forces.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]

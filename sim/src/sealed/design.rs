@@ -1,10 +1,9 @@
 //! Designs of sealed data sets: which passes were made. They differ as laboratories' sweeps do.
 
+use crate::noise::Noise;
 use models::condition::Condition;
 use models::quantity::{Direction, PeakToPeak};
 use serde::{Deserialize, Serialize};
-
-use crate::noise::Noise;
 
 /// The plan of a set, in words that its label can hold.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]

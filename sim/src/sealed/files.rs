@@ -1,10 +1,9 @@
 //! A sealed set on disk: what a diagnoser may read in one folder, what only the scorer may read in another.
 
+use super::{Label, Set};
 use std::fs;
 use std::io;
 use std::path::Path;
-
-use super::{Label, Set};
 
 impl Set {
     /// Writes `points.csv`, `rig.toml` and `conditions.csv` to `open`, `label.toml` and `truth.csv` to

@@ -5,12 +5,11 @@
 //! and shapes together; and for expensive causes all this on a part of the passes first, the whole table if
 //! that comes near.
 
-use serde::{Deserialize, Serialize};
-
 use super::form::{Kernel, solved};
 use super::oracle::{Case, Fit, NUISANCES, moved};
 use crate::defects::{ALL, Defect, DefectKind, Defects, Draw, Parameter, Values, compatible};
 use crate::noise::Noise;
+use serde::{Deserialize, Serialize};
 
 /// Causes whose ridges fly or recover late: marched through many cycles, hundred times as dear as the others.
 const DEAR: [&str; 3] = ["ridge_inertia", "normal_damping", "lateral_recovery"];

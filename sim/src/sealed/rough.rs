@@ -1,13 +1,12 @@
 //! Sealed sets whose scatter is not what rig.toml states: bad passes, heavy tails, scatter that lasts, shifts
 //! between runs, a repeatability stated too small.
 
-use serde::{Deserialize, Serialize};
-
 use super::bench::Bench;
 use super::design::{Design, Planned};
 use crate::defects::{DefectKind, Defects};
 use crate::noise::Noise;
 use models::pass::Pass;
+use serde::{Deserialize, Serialize};
 
 /// How the scatter of a set departs from normal, independent scatter of the stated size.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]

@@ -1,7 +1,5 @@
 //! What a world is made of.
 
-use serde::{Deserialize, Serialize};
-
 use crate::amplifier::AmplifierConfig;
 use crate::defects::Defects;
 use crate::finger::FingerConfig;
@@ -9,6 +7,7 @@ use crate::plate::PlateConfig;
 use crate::room::RoomConfig;
 use crate::sensor::SensorConfig;
 use crate::stage::StageConfig;
+use serde::{Deserialize, Serialize};
 
 /// Everything a world is built from, besides its seed.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]

@@ -1,5 +1,5 @@
-//! Cases run on the threads of the pool that this is called in; results come in the order of the cases. It is the one loop of
-//! cases: the worker writes what it gives, [`here`] reads it at once.
+//! Cases run on the threads of the pool that this is called in; results come in the order of the cases. It is
+//! the one loop of cases: the worker writes what it gives, [`here`] reads it at once.
 
 use super::file::Header;
 use super::kinds::{Case, CaseKind, Cell, Outcome};

@@ -228,8 +228,8 @@ pub fn submit(study: &Study, options: &Options) -> miette::Result<Submitted> {
     Ok(submitted)
 }
 
-/// Cases of one name in a folder, run where they have no result, and read: `NAME.jsonl` are the cases, `NAME/` is the
-/// study, `NAME.parquet` its table.
+/// Cases of one name in a folder, run where they have no result, and read: `NAME.jsonl` are the cases,
+/// `NAME/` is the study, `NAME.parquet` its table.
 ///
 /// # Errors
 /// A folder that holds other cases of that name, cases that are left without a result, whatever [`submit`] says.
@@ -252,8 +252,8 @@ pub fn whole(
     Reader::open(study.kind, &table)?.collect()
 }
 
-/// Refuses options that no engine or not this one has, before a folder is made; gives the engine, none for this
-/// machine.
+/// Refuses options that no engine or not this one has, before a folder is made; gives the engine, none for
+/// this machine.
 ///
 /// # Errors
 /// Whatever is wrong with the options.

@@ -75,8 +75,8 @@ impl Began {
 /// Cells of the guesses in each direction.
 const CELLS: usize = 64;
 
-/// Guesses of the root, made on first use: see [`super::prepare`]. Nodes are evenly spaced in the square roots
-/// of what the root is not smooth in.
+/// Guesses of the root, made on first use: see [`super::prepare`]. Nodes are evenly spaced in the square
+/// roots of what the root is not smooth in.
 pub(super) struct Guesses {
     /// Where sticking begins at touch-down: the root's share of the contact.
     early: Vec<[f32; CELLS + 1]>,

@@ -6,8 +6,8 @@ fn now(bench: &Bench) -> u64 {
     u64::from(bench.n) * T.0
 }
 
-/// 2.4 ms of ring time makes the response time 12 + 18 + 2 = 32 whole cycles: the 33rd cycle after a change is the first to
-/// be judged.
+/// 2.4 ms of ring time makes the response time 12 + 18 + 2 = 32 whole cycles: the 33rd cycle after a change
+/// is the first to be judged.
 fn whole_cycles() -> Bench {
     let mut bench = Bench::armed();
     bench.limits.timing.ring_time = Nanos(2_400_000);

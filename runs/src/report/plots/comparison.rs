@@ -50,8 +50,8 @@ const FACTORS: [Factor; 3] = [
     ("normal force", "N", |p| p.normal_force_n, FORCE),
 ];
 
-/// The differences against amplitude, a mark a level of the factor that varies most, with the shift that they have in common unless they
-/// vary by more than their uncertainty.
+/// The differences against amplitude, a mark a level of the factor that varies most, with the shift that they
+/// have in common unless they vary by more than their uncertainty.
 pub fn differences(result: &Comparison) -> miette::Result<String> {
     let widest = widest(result);
     let [low, high] = about_zero(

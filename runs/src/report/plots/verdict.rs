@@ -73,8 +73,8 @@ pub struct LawPass {
     pub suspect: bool,
 }
 
-/// What a cause does, over the passes: the curve with a band of two standard deviations, and the library's law
-/// alone.
+/// What a cause does, over the passes: the curve with a band of two standard deviations, and the library's
+/// law alone.
 pub fn law(
     name: &str,
     (x_name, span): (&str, Span),

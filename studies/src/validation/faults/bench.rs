@@ -6,8 +6,6 @@ use calibration::certificate::sha256_hex;
 use models::condition::{Condition, OutOfDomain};
 use models::finger::Finger;
 use models::law::Rendering;
-use runs::supervisor::{Loop, VirtualLoop};
-
 use models::prediction::{FrictionModel, Prediction, SpringSlider};
 use models::quantity::PeakToPeak;
 use models::target::Target;
@@ -18,6 +16,7 @@ use realtime::ports::Nanos;
 use realtime::replay::replay;
 use realtime::safety::{Cause, Exposed, Limits, Request, Trip};
 use realtime::turn::{Ports, Row};
+use runs::supervisor::{Loop, VirtualLoop};
 use serde::{Deserialize, Serialize};
 use sim::amplifier::AmplifierInput;
 use sim::virtual_rig::{SharedRig, VirtualRig};

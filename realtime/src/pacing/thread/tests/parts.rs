@@ -9,8 +9,8 @@ pub(super) fn touch_new_pages(pages: usize) {
         return;
     }
     let length = pages * 4096;
-    // SAFETY: a new private mapping of `length` bytes, written inside its bounds one byte a page, and given back; it is not
-    // used where the kernel refuses it.
+    // SAFETY: a new private mapping of `length` bytes, written inside its bounds one byte a page, and given
+    // back; it is not used where the kernel refuses it.
     unsafe {
         let (prot, flags) = (libc::PROT_READ | libc::PROT_WRITE, libc::MAP_PRIVATE | libc::MAP_ANONYMOUS);
         let memory = libc::mmap(std::ptr::null_mut(), length, prot, flags, -1, 0);
