@@ -8,7 +8,7 @@ use tests::{documents, muprime, rounds, texts};
 fn reproduced() -> (Vec<Value>, tempfile::TempDir) {
     let folder = tempfile::tempdir().unwrap();
     let mut command = muprime();
-    command.args(["--json", "model", "reproduce", "all", "--elements", rounds("100", "200"), "--out"]);
+    command.args(["--json", "model", "reproduce", "all", "--elements", rounds("128", "200"), "--out"]);
     let made = command.arg(folder.path()).output().unwrap();
     assert_eq!(made.status.code(), Some(0), "{}", texts(&made).1);
     (documents(&made), folder)

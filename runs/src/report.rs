@@ -6,7 +6,7 @@
 //! | `page`, [`about`], [`events`], [`traces`], [`fidelity`], `explore` | a run |
 //! | [`diagnosis`] | a verdict; law figure: `diagnosis/law` and `plots/verdict` |
 //! | [`comparison`], [`groups`] | two runs, more |
-//! | [`plots`], [`published`], [`html`], [`human`], `levels` | figures, published values, text, quantities, levels |
+//! | [`plots`], [`published`], [`mod@html`], [`human`], `levels` | figures, published values, text, quantities, levels |
 
 pub mod about;
 pub mod comparison;

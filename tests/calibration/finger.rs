@@ -99,7 +99,7 @@ fn phases_csv() -> String {
     let amplitudes_um = rounds([1.1, 1.4, 1.8, 2.4, 1.4, 1.8], [1.1, 1.3, 1.5, 1.8, 2.2, 2.6]);
     for (n, um) in amplitudes_um.into_iter().enumerate() {
         let amplitude = PeakToPeak::from_metres(um * 1e-6);
-        let case = RidgeCase { amplitude, speed_m_s: 0.0, elements: rounds(500, 800), ..RidgeCase::paper() };
+        let case = RidgeCase { amplitude, speed_m_s: 0.0, elements: rounds(512, 800), ..RidgeCase::paper() };
         let settings = RunSettings { step_s: Some(4.5e-9), energy: false, ..RunSettings::default() };
         let phase = run(&case, &settings).unwrap().phase_shift_deg.unwrap();
         let scatter = 2.2 * (7.3 * n as f64).sin();
@@ -118,7 +118,7 @@ fn the_command_finds_the_skin_in_a_file_of_phases() {
     let calibrate = |out: &str| {
         let mut command = muprime();
         command.args(["--json", "calibrate", "finger", "--operator", "a", "--serial", "index"]);
-        command.args(["--elements", rounds("250", "400"), "--modulus-range-pa", "23e6", "35e6", "--out"]);
+        command.args(["--elements", rounds("256", "400"), "--modulus-range-pa", "23e6", "35e6", "--out"]);
         command.arg(folder.path().join(out)).arg(&phases).output().unwrap()
     };
     let output = calibrate("finger.toml");
