@@ -261,7 +261,7 @@ fn a_key_that_is_held_from_the_beginning_arms_nothing() {
             let mut run = Run::with(&rig, folder.path(), &format!("stuck-{n}"), "", Hand::Stuck);
             let (status, said) = run.end();
             assert!(!run.driven.load(Ordering::Relaxed) && !run.amplifier.read().on, "{said}");
-            if !said.contains("would not arm: the dead-man device was released") {
+            if !said.contains("did not arm: the dead-man device was released") {
                 return Some(run.out.clone());
             }
             assert_eq!(status, Some(1), "{said}");

@@ -176,7 +176,7 @@ fn a_run_is_seen_paused_and_resumed_from_two_terminals() {
         assert!(ended.contains("12 of 12 passes"), "what was said meanwhile is told afterwards:\n{ended}");
         let told = std::fs::read_to_string(out.join("report.html")).unwrap();
         assert!(
-            told.contains("paused before point") && told.contains("resuming"),
+            told.contains("paused before pass") && told.contains("resuming"),
             "the record shows the pause"
         );
         let replayed = muprime().arg("replay").arg(&out).output().unwrap();
