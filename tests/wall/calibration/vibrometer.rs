@@ -164,6 +164,8 @@ fn an_amplitude_table_taken_live_finds_the_withheld_scale() {
             line.clear();
         }
     }
+    // It came byte by byte.
+    let all = String::from_utf8(all.chars().map(|byte| byte as u8).collect()).unwrap();
     let done = child.wait_with_output().unwrap();
     assert!(done.status.success(), "{all}");
     assert!(readings >= 11 && trips >= 1, "{readings} readings, {trips} trips: {all}");
