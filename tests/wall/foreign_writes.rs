@@ -51,6 +51,8 @@ use Fate::{Trips, Unseen};
 const DRIVE: &[Cause] = &[EchoMismatch, AmplitudeRunaway, DriveNoResponse, AmplitudeRate];
 const ANOTHER_LIFE: &str =
     "a second master that keeps feeding it outlives this program's end: the second channel is left";
+/// A chamber is beside the loop: what it measures goes with each pass (`runs/src/sequence/passing.rs`).
+const AIR: &str = "no run trips; a pass whose level left its tolerance is marked `lost`";
 
 cases! {
     "muprime-amplifier" "amplitude" in "virtual-ideal": Some((Wire::Amplitude, 3e-6)) => Trips(DRIVE, 400);
@@ -60,6 +62,9 @@ cases! {
     "muprime-stage" "velocity" in "virtual-ideal": Some((Wire::Velocity, 0.05)) => Trips(&[StageNotFollowing], 400);
     "muprime-stage" "load" in "virtual-ideal": Some((Wire::NormalForce, 1.0)) => Trips(&[LoadImplausible, ForceRate, NormalOverforce, Noisy], 2500);
     "muprime-stage" "heartbeat" in "virtual-ideal": None => Unseen(ANOTHER_LIFE);
+    "muprime-chamber" "pressure" in "virtual-ideal": None => Unseen(AIR);
+    "muprime-chamber" "temperature" in "virtual-ideal": None => Unseen(AIR);
+    "muprime-chamber" "humidity" in "virtual-ideal": None => Unseen(AIR);
     "muprime-relay" "closed" in "virtual-relay": Some((Wire::CloseSupply, 0.0)) => Trips(&[SupplySwitch, EchoMismatch, DriveNoResponse, AmplifierFault], 1000);
     "wago-750-watchdog" "closed" in "wago": Some((Wire::CloseSupply, 0.0)) => Trips(&[SupplySwitch, EchoMismatch, DriveNoResponse, AmplifierFault], 1000);
     "wago-750-watchdog" "heartbeat" in "wago": None => Unseen("a second master that keeps feeding it keeps the supply closed beyond this program's end");
