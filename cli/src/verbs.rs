@@ -78,7 +78,7 @@ const UNREAD: &str = "unread.txt";
 static RUN: OnceLock<PathBuf> = OnceLock::new();
 
 /// A rig is driven from now on: nobody waits for a reader of standard output or standard error, and what they
-/// do not take stands in the run's folder afterwards.
+/// do not take is written into the run's folder afterwards.
 ///
 /// # Errors
 /// The system gives no thread.

@@ -162,6 +162,15 @@ pub enum OpenError {
     /// The chamber reads none of [`chamber::QUANTITIES`].
     #[error("profile `{0}` has no signal `pressure`, `temperature` or `humidity`")]
     NoAir(String),
+    /// The setup does not say which of a vibrometer's decoders it means.
+    #[error("`{id}` at {address}: {problem}")]
+    Decoder { id: String, address: String, problem: String },
+    /// A vibrometer's settings changed while they were read.
+    #[error(
+        "`{id}` at {address}: the settings changed while they were read; \
+        let nobody touch the controller and ask again"
+    )]
+    SettingsChanged { id: String, address: String },
     /// The profile is another instrument's.
     #[error("profile `{0}` is not that of a vibrometer's controller")]
     NoVibrometer(String),

@@ -4,7 +4,6 @@
 //! metres. They are queried once, before a calibration, and never changed. Each instrument numbers its
 //! decoders differently, and a wrong one gives a plausible wrong amplitude, so their names are queried first.
 
-use super::endpoint::BadFrame;
 use super::library::Source;
 use super::serial::Line;
 use super::{Ended, OpenError};
@@ -140,12 +139,12 @@ pub fn settings(setup: &VibrometerSetup) -> Result<Settings, OpenError> {
         }
     }
     let number = choose(&decoders, setup.decoder.as_deref());
-    let number = number.map_err(|problem| failed(BadFrame::WrongInstrument(problem).into()))?;
+    let number =
+        number.map_err(|problem| OpenError::Decoder { id: id.clone(), address: address.clone(), problem })?;
     let mut read = || talk.settings(&profile, number, &decoders).map_err(failed);
     let (first, second) = (read()?, read()?);
     if first != second {
-        let why = "the settings changed while they were read; let nobody touch the controller and ask again";
-        return Err(failed(BadFrame::Corrupt(why.into()).into()));
+        return Err(OpenError::SettingsChanged { id: id.clone(), address: address.clone() });
     }
     Ok(first)
 }

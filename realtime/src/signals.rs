@@ -73,7 +73,7 @@ pub enum NoData {
     /// Nothing has arrived since the port was opened.
     #[error("nothing has arrived yet")]
     NeverRead,
-    /// The link is down; the driver is trying to make it anew.
+    /// The link is down; the driver is reconnecting.
     #[error("the link is down")]
     Disconnected,
     /// The instrument does not have this channel.
