@@ -212,7 +212,7 @@ fn the_doctor_goes_on_after_an_instrument_that_fails() {
         let (code, found) = doctor(&setup(folder.path(), &force(&address), &address, &address));
         assert_eq!(code, Some(0), "{found:?}");
         let text = |i: usize| found[i]["found"].as_str().unwrap().to_string();
-        assert!(text(0).contains("lateral -0.125") && text(0).contains("normal +0.2"), "{}", text(0));
+        assert!(text(0).contains("lateral -0.125") && text(0).contains("normal 0.2"), "{}", text(0));
         assert!(text(1).contains("output off") && text(2).contains("at 12.500 mm"), "{found:?}");
 
         let (code, found) = doctor(&setup(folder.path(), &force(&nobody), &nobody, &address));
@@ -251,8 +251,8 @@ fn a_sweep_that_the_sensor_cannot_see_is_refused_before_anything_is_touched() {
     assert_eq!(code, Some(2), "{said}");
     for part in [
         "series 'a'",
-        "w = 3e-6 m",
-        "Fn = 0.03 N",
+        "w = 3 µm",
+        "Fn = 30 mN",
         "`robotiq-ft300` (fx)",
         "its count is 10.0 mN",
         "raise the normal",
