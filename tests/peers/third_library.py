@@ -78,18 +78,30 @@ def _(c, d, inverse, knee):
     c.march = (fall, lambda x, before, top, drag, dt: fall(x, dt))
 
 
-@law("lateral_recovery", (3e-7, 1e-3))
-def _(c, d, tau):
-    c.march = (lambda x, dt: x * np.exp(-dt / tau), lambda x, before, top, drag, dt: top + (x - top)
-               * np.exp(-dt / tau))
+def relaxing(c, tau, growth):
+    """A rate that is one in `tau` at 0.1 um, of which a share goes in proportion to the stretch."""
+    slow, unit = tau / (1 - growth), growth / ((1 - growth) * 1e-7 * c.kl)
+
+    def fall(x, dt):
+        kept = np.exp(-dt / slow)
+        return x * kept / (1 + unit * (1 - kept) * np.maximum(x, 0))
+    return fall
 
 
-@law("lateral_recovery", (3e-7, 1e-3))
-def _(c, d, tau):
+@law("lateral_recovery", (3e-7, 1e-3), (0, 0.99))
+def _(c, d, tau, growth):
+    fall = relaxing(c, tau, growth)
+    c.march = (fall, lambda x, before, top, drag, dt: top + fall(x - top, dt))
+
+
+@law("lateral_recovery", (3e-7, 1e-3), (0, 0.99))
+def _(c, d, tau, growth):
+    fall = relaxing(c, tau, growth)
+
     def drawn(x, before, top, drag, dt):
         added = drag - (top - before) + np.minimum(x - before, 0)
-        return top + np.maximum(x - before, 0) * np.exp(-dt / tau) - added * np.expm1(-dt / tau) * tau / dt
-    c.march = (lambda x, dt: x * np.exp(-dt / tau), drawn)
+        return top + fall(np.maximum(x - before, 0), dt) - added * np.expm1(-dt / tau) * tau / dt
+    c.march = (fall, drawn)
 
 
 def retarded(c, a, tau):
@@ -117,14 +129,19 @@ def retarded(c, a, tau):
     return (c.kn * a)[:, None] * np.where(angle < last[:, None], np.maximum(force, 0), 0)
 
 
-@law("normal_damping", (3e-8, 1e-4))
-def _(c, d, tau):
-    c.press = lambda c, a: retarded(c, a, tau * np.ones_like(a))
+def plate_speed(c, d):
+    """Peak speed of the plate over that of the largest amplitude at the reference frequency."""
+    return np.maximum(c.w * c.f / (d.w_top * d.f_ref), 1e-9)
 
 
-@law("normal_damping", (0.02, 10))
-def _(c, d, loss):
-    c.press = lambda c, a: retarded(c, a, loss / (2 * np.pi * c.f))
+@law("normal_damping", (3e-8, 1e-4), (-1, 1.5))
+def _(c, d, tau, e):
+    c.press = lambda c, a: retarded(c, a, tau * plate_speed(c, d) ** e)
+
+
+@law("normal_damping", (0.02, 10), (-1, 1.5))
+def _(c, d, loss, e):
+    c.press = lambda c, a: retarded(c, a, loss / (2 * np.pi * c.f) * plate_speed(c, d) ** e)
 
 
 @law("normal_damping", (0.02, 10), (3e-7, 5e-5))
@@ -178,9 +195,9 @@ def _(c, d, e):
     c.mu = c.mu * (c.U / 0.02) ** e
 
 
-@law("rate_dependent_friction", (-0.8, 3), (2e-3, 0.2))
-def _(c, d, s, u):
-    c.mu = c.mu * (1 + s * np.exp(-((c.U / u) ** 2)))
+@law("rate_dependent_friction", (-0.8, 3), (2e-3, 0.2), (-1, 1))
+def _(c, d, s, u, e):
+    c.mu = c.mu * (1 + s * np.exp(-((c.U * (c.F / d.F_ref) ** -e / u) ** 2)))
 
 
 @law("rate_dependent_friction", (-0.4, 0.6))
@@ -188,9 +205,9 @@ def _(c, d, s):
     c.mu = c.mu * np.maximum(1 + s * np.log(c.U / 0.02), 0.05)
 
 
-@law("rate_dependent_friction", (-0.6, 0.8), (-5, 5), (-3, 3))
-def _(c, d, s, bend, more):
-    x = np.log(c.U / 0.02)
+@law("rate_dependent_friction", (-0.6, 0.8), (-5, 5), (-3, 3), (-1, 1))
+def _(c, d, s, bend, more, e):
+    x = np.log(c.U / 0.02 * (c.F / d.F_ref) ** -e)
     c.mu = c.mu * np.exp(np.clip(s * x * (1 + x * (bend + x * more)), -2, 2))
 
 
@@ -251,20 +268,21 @@ for _nodes in MEDIANS.values():
     law("multi_asperity", (1e-8, 6e-6))(_heights)
 
 
-def creeping(log, both, stretched=False):
-    """A change of stiffness over time."""
-    def act(c, d, s, tau, power=1.0):
-        share = np.log1p(d.t / tau) if log else -np.expm1(-((d.t / tau) ** power))
+def creeping(log, both):
+    """A change of stiffness over time, of which a share begins anew in each run."""
+    def act(c, d, s, tau, in_run=0.0, power=1.0):
+        t = d.t + in_run * (d.trun - d.t)
+        share = np.log1p(t / tau) if log else -np.expm1(-((t / tau) ** power))
         factor = np.maximum(1 + s * share, 0.05)
         c.kn, c.kl = c.kn * factor, c.kl * (factor if both else 1)
     return act
 
 
-law("subsurface_relaxation", (-0.8, 4), (1, 3000))(creeping(False, True))
+law("subsurface_relaxation", (-0.8, 4), (1, 3000), (0, 1))(creeping(False, True))
 law("subsurface_relaxation", (-0.15, 1.5), (0.3, 1000))(creeping(True, True))
 law("subsurface_relaxation", (-0.8, 4), (1, 3000))(creeping(False, False))
 law("subsurface_relaxation", (-0.15, 1.5), (0.3, 1000))(creeping(True, False))
-law("subsurface_relaxation", (-0.8, 4), (1, 3000), (0.25, 1.5))(creeping(False, False))
+law("subsurface_relaxation", (-0.8, 4), (1, 3000), (0, 1), (0.25, 1.5))(creeping(False, False))
 
 
 def stiffer(normal, lateral):
@@ -297,10 +315,10 @@ def _(c, d, s):
     c.w = c.w * np.maximum(1 - s * c.F, 0.02)
 
 
-@law("amplitude_saturation", (3e4, 5e6), (0.7, 20), (-1, 2))
-def _(c, d, s, n, e):
+@law("amplitude_saturation", (3e4, 5e6), (0.7, 20), (-1, 2), (0.3, 3.5))
+def _(c, d, s, n, e, fold):
     x = np.maximum(s * c.w * (c.f / d.f_ref) ** e, 1e-9)
-    c.w = c.w * np.exp(-np.logaddexp(0, n * np.log(x)) / n)
+    c.w = c.w * np.exp(-fold * np.logaddexp(0, n * np.log(x)) / n)
 
 
 @law("amplitude_saturation", (3e4, 5e6))
@@ -314,9 +332,11 @@ def _(c, d, s, point, soft):
     c.w = c.w / np.hypot(1, s * (d.T - d.T[0] - point + soft * (c.w / d.w_top) ** 2))
 
 
-@law("resonance_detuning", (0.1, 12), (0.1, 5), (-2, 2), (-3, 3))
-def _(c, d, s, tau, point, soft):
-    c.w = c.w / np.hypot(1, s * (-np.expm1(-d.t / d.duration / tau) - point + soft * (c.w / d.w_top) ** 2))
+@law("resonance_detuning", (0.1, 12), (0.1, 5), (-2, 2), (-3, 3), (0.12, 8), (0, 1))
+def _(c, d, s, tau, point, soft, steep, in_run):
+    t = d.t + in_run * (d.trun - d.t)
+    off = s * (-np.expm1(-t / d.duration / tau) - point + soft * (c.w / d.w_top) ** 2)
+    c.w = c.w / (1 + off**2 / steep) ** (steep / 2)
 
 
 @law("resonance_detuning", (0.1, 12), (0.1, 5))
@@ -490,7 +510,8 @@ def nothing(c, d):
 
 
 def inertia_left(fit, rng):
-    """The same for ridges with mass: a scan of mass and damping, twice narrowed, with linear nuisances."""
+    """The same for ridges with mass: a scan of mass, damping and its power of the plate's speed, twice narrowed, with
+    linear nuisances."""
     chi2 = (fit.residuals(nothing, fit.base, ())[0]) ** 2
     keep = np.sort(np.argsort(-chi2)[::2][:INERTIA_PASSES])
     small = Fit.__new__(Fit)
@@ -499,16 +520,17 @@ def inertia_left(fit, rng):
     small.nominal, small.widths, small.base = fit.nominal, fit.widths, fit.base
     slopes, best = small.slopes(None, fit.base, ()), np.inf
     for landing in (1.0, 0.2):
-        def act(c, d, mass, zeta):
+        def act(c, d, mass, zeta, e):
             critical = 2 * np.sqrt(c.kn * mass)
+            zeta = np.minimum(zeta * np.clip(plate_speed(c, d), 0.05, 2) ** e, 1.0)
             c.mean = lambda c: bounce(c, mass, zeta * critical, 0.0, 60.0, 2 * landing * np.sqrt(60 * c.kn * mass),
                                       0.0, 40, 12)
-        centre, width = np.array([np.log(8e-6), np.log(0.45)]), np.array([1.15, 1.0])
+        centre, width = np.array([np.log(8e-6), np.log(0.45), 0.2]), np.array([1.15, 1.0, 0.7])
         for _ in range(3):
-            theta = np.clip(centre + width * rng.uniform(-1, 1, (INERTIA_TRIES, 2)), np.log([2.5e-6, 0.1]),
-                            np.log([4e-5, 1.0]))
+            theta = np.clip(centre + width * rng.uniform(-1, 1, (INERTIA_TRIES, 3)),
+                            [*np.log([2.5e-6, 0.1]), -1.0], [*np.log([4e-5, 1.0]), 1.5])
             tries = np.column_stack([np.tile(fit.base, (INERTIA_TRIES, 1)), theta])
-            found = small.residuals(act, tries, ((1e-9, 1), (1e-9, 1)))
+            found = small.residuals(act, tries, ((1e-9, 1), (1e-9, 1), (-1, 1.5)))
             moved = np.linalg.solve(slopes @ slopes.T + np.eye(3), -(found @ slopes.T).T - fit.base[:, None]).T
             cost = ((found + moved @ slopes) ** 2).sum(1)
             centre, width = theta[np.argmin(cost)], width * 0.4

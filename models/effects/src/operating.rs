@@ -64,6 +64,7 @@ impl Baseline {
             inverse_recovery_speed: 0.0,
             recovery_knee: 0.0,
             lateral_relaxation_time: 0.0,
+            relaxation_growth: 0.0,
             viscous_slip: false,
             bonding_time: 0.0,
             bonding_exponent: 1.0,

@@ -223,17 +223,25 @@ fn jkr_adds_four_pull_offs_at_no_load() {
     assert!((mean_friction(&c) - expected).abs() < 1e-12);
 }
 
-/// Slip against viscosity by small explicit steps of `x' = U - (x - limit)/time`, which share nothing with the sweep's.
+/// Slip against viscosity by small explicit steps of `x' = U - e/time (1 - g + g e/0.1 um)` with `e = x - limit`,
+/// which share nothing with the sweep's.
 #[test]
 fn slip_against_viscosity_is_that_of_small_steps() {
-    for (amplitude, speed, load, time) in [
-        (3e-6, 0.02, 0.25, 2e-5),
-        (0.5e-6, 0.005, 0.3, 1.5e-5),
-        (1e-6, 0.08, 1.2, 5e-6),
-        (2e-6, 0.04, 0.5, 1e-7),
+    for (amplitude, speed, load, time, growth) in [
+        (3e-6, 0.02, 0.25, 2e-5, 0.0),
+        (0.5e-6, 0.005, 0.3, 1.5e-5, 0.0),
+        (1e-6, 0.08, 1.2, 5e-6, 0.0),
+        (2e-6, 0.04, 0.5, 1e-7, 0.0),
+        (3e-6, 0.02, 0.25, 2e-5, 0.4),
+        (1e-6, 0.08, 0.5, 8e-6, 0.95),
     ] {
         let c = contact(amplitude, speed, load, 1e6, 0.4e6);
-        let swept = mean_friction(&Contact { viscous_slip: true, lateral_relaxation_time: time, ..c });
+        let swept = mean_friction(&Contact {
+            viscous_slip: true,
+            lateral_relaxation_time: time,
+            relaxation_growth: growth,
+            ..c
+        });
         let scale = c.normal_stiffness * c.half_amplitude();
         let phi = half_contact_angle(c.load_ratio(), 0.0);
         let offset = if phi >= PI { c.load_ratio() } else { -phi.cos() };
@@ -247,7 +255,9 @@ fn slip_against_viscosity_is_that_of_small_steps() {
                 let pressed = scale * (phase.cos() + offset).max(0.0);
                 let limit = c.mu0 * pressed / c.lateral_stiffness;
                 let drag = if pressed > 0.0 { c.speed } else { 0.0 };
-                x += drag * dt - (x - limit).max(0.0) * -(-dt / time).exp_m1();
+                let excess = (x - limit).max(0.0);
+                let rate = (1.0 - growth + growth * excess / 1e-7) / time;
+                x += drag * dt - excess * -(-dt * rate).exp_m1();
                 sum += c.lateral_stiffness * x.min(limit) / f64::from(steps);
             }
         }

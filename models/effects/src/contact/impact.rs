@@ -128,12 +128,15 @@ pub fn friction_ratio(c: &Contact) -> f64 {
     ((sum.exp() * (pressed + least) - least) / base).max(0.0)
 }
 
-/// Makes every node that a landing and a damping ratio can ask for, so that none is made inside a control loop.
-pub fn prepare(landing: usize, damping_ratio: f64) {
-    let (below, _) = DAMPING.place(damping_ratio.ln());
+/// Makes every node that a landing and damping ratios between two can ask for, so that none is made inside a
+/// control loop.
+pub fn prepare(landing: usize, damping_ratios: [f64; 2]) {
+    let [a, b] = damping_ratios.map(|d| DAMPING.place(d.ln()).0);
     for load in 0..LOAD.count {
         for ratio in 0..RATIO.count {
-            let _ = (node(landing, load, ratio, below), node(landing, load, ratio, below + 1));
+            for damping in a.min(b)..=a.max(b) + 1 {
+                let _ = node(landing, load, ratio, damping);
+            }
         }
     }
 }
@@ -355,7 +358,7 @@ mod tests {
     #[test]
     fn a_prepared_table_makes_no_node_when_asked() {
         let damping_ratio = 0.35;
-        prepare(0, damping_ratio);
+        prepare(0, [damping_ratio; 2]);
         let before = made();
         assert_eq!(before, 2 * LOAD.count * RATIO.count);
         let baseline = Baseline { mu0: 0.5, normal_stiffness_n_per_m: 1.2e6, lateral_stiffness_n_per_m: 4e5 };
@@ -383,7 +386,7 @@ mod tests {
                                 normal_force_n,
                                 ..Condition::paper()
                             };
-                            let theta = [mass_kg, damping_ratio];
+                            let theta = [mass_kg, damping_ratio, 0.0];
                             let active = [Active { effect, law: 0, theta: &theta }];
                             let with = lateral_force(&baseline, &active, &pass, &design);
                             let without = lateral_force(&baseline, &[], &pass, &design);

@@ -15,6 +15,9 @@ pub const POINTS: usize = 96;
 /// The same where a search only looks for places to begin: within 1e-2 (tested).
 pub const COARSE_POINTS: usize = 24;
 
+/// Stretch at which the relaxation time is what it is stated to be, m.
+pub const STATED_STRETCH_M: f64 = 1e-7;
+
 /// Share of the largest stretch within which a cycle ends as it began.
 const SETTLED: f64 = 1e-7;
 
@@ -106,9 +109,12 @@ struct Lateral {
     advance: f64,
     rate_step: f64,
     keep_step: f64,
+    /// What a step at stretch `x` keeps less, by `1 + grown_step x`, where the rate grows with the stretch.
+    grown_step: f64,
     drawn: f64,
     rate_airborne: f64,
     keep_airborne: f64,
+    grown_airborne: f64,
     knee: f64,
 }
 
@@ -116,11 +122,15 @@ impl Lateral {
     fn new(c: &Contact, dt: f64, airborne: f64) -> Self {
         let rate =
             if c.inverse_recovery_speed > 0.0 { 1.0 / c.inverse_recovery_speed } else { f64::INFINITY };
+        // dx/dt = -x/time (1 - g + g x/stated): at a stretch of zero the rate is the share that does not grow.
+        let slow = c.lateral_relaxation_time / (1.0 - c.relaxation_growth);
+        let growth = c.relaxation_growth / ((1.0 - c.relaxation_growth) * STATED_STRETCH_M);
+        let grown = |time: f64| if growth > 0.0 { -growth * (-time / slow).exp_m1() } else { 0.0 };
         let keep = |time: f64| {
             if time < 1e-15 {
                 1.0
             } else if c.lateral_relaxation_time > 0.0 {
-                (-time / c.lateral_relaxation_time).exp()
+                (-time / slow).exp()
             } else if rate.is_finite() {
                 1.0
             } else {
@@ -133,6 +143,7 @@ impl Lateral {
             advance: c.speed * dt,
             rate_step: fall(dt),
             keep_step: keep(dt),
+            grown_step: grown(dt),
             // Of what a step adds evenly, this much is still there at its end.
             drawn: match c.lateral_relaxation_time {
                 t if c.viscous_slip && t > 0.0 => -(-dt / t).exp_m1() * t / dt,
@@ -140,6 +151,7 @@ impl Lateral {
             },
             rate_airborne: fall(airborne),
             keep_airborne: keep(airborne),
+            grown_airborne: grown(airborne),
             knee: c.recovery_knee,
         }
     }
@@ -151,10 +163,16 @@ impl Lateral {
             self.contact(limits, start, |x, before, limit| {
                 let excess = (x - before).max(0.0);
                 let added = self.advance - (limit - before) + (x - before).min(0.0);
-                (limit + excess * self.keep_step + added * self.drawn).max(limit)
+                (limit + excess * self.keep_step / (1.0 + self.grown_step * excess) + added * self.drawn)
+                    .max(limit)
             })
         } else if self.knee > 0.0 && self.rate_step.is_finite() {
             self.contact(limits, start, |x, _, limit| softened(x, self.rate_step, self.knee).max(limit))
+        } else if self.grown_step > 0.0 {
+            self.contact(limits, start, |x, _, limit| {
+                let excess = x - limit;
+                (limit + excess * self.keep_step / (1.0 + self.grown_step * excess)).max(limit)
+            })
         } else {
             self.contact(limits, start, |x, _, limit| {
                 (limit + (x - limit) * self.keep_step - self.rate_step).max(limit)
@@ -198,7 +216,7 @@ impl Lateral {
         if self.knee > 0.0 && self.rate_airborne.is_finite() {
             return softened(x, self.rate_airborne, self.knee).max(0.0);
         }
-        (x * self.keep_airborne - self.rate_airborne).max(0.0)
+        (x * self.keep_airborne / (1.0 + self.grown_airborne * x) - self.rate_airborne).max(0.0)
     }
 }
 

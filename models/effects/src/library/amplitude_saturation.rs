@@ -20,6 +20,8 @@ pub(super) static EFFECT: Effect = Effect {
                 Parameter::shape("sharpness", "1", 4.0, 0.6),
                 // A current that is limited drives less the higher the frequency; a voltage, the same.
                 Parameter::signed("frequency_exponent", "1", 0.5, -1.0, 2.0).bending(),
+                // Beyond its limit a drive that heats up or loses its resonance gives less, not as much.
+                Parameter::shape("steepness_beyond_limit", "1", 1.0, 0.4).bending(),
             ],
         )
         .seen_by(CHECK, 2e4),
@@ -34,7 +36,7 @@ pub(super) static EFFECT: Effect = Effect {
             0 => 1.0 / x.max(1.0),
             1 => {
                 let x = x * (c.frequency / design.reference_frequency_hz).powf(theta[2]);
-                (1.0 + x.powf(theta[1])).powf(-1.0 / theta[1])
+                (1.0 + x.powf(theta[1])).powf(-theta[3] / theta[1])
             }
             _ if x > 1e-6 => x.tanh() / x,
             _ => 1.0,

@@ -8,6 +8,13 @@ const LIMITS: [Parameter; 2] = [
     Parameter::shape("stretch_of_half_speed", "m", 1e-7, 1.3).bending(),
 ];
 
+/// A relaxation time, and how much of its rate grows with the stretch: skin stiffens as it is stretched, and
+/// draws back the faster.
+const RELAXES: [Parameter; 2] = [
+    Parameter::positive("relaxation_time", "s", 30e-6, 1e-3),
+    Parameter::positive("share_that_grows_with_stretch", "1", 0.5, 0.99).bending(),
+];
+
 pub(super) static EFFECT: Effect = Effect {
     name: "lateral_recovery",
     place: Location::Contact,
@@ -15,15 +22,15 @@ pub(super) static EFFECT: Effect = Effect {
     source: "section 5.3 of the paper (recovery at 1.5 to 15 mm/s); Kelvin-Voigt as the second form",
     laws: &[
         Law::new("rate limit, slower near rest", &LIMITS),
-        Law::new("exponential", &[Parameter::positive("relaxation_time", "s", 30e-6, 1e-3)]),
-        Law::new("slip against viscosity", &[Parameter::positive("relaxation_time", "s", 30e-6, 1e-3)]),
+        Law::new("exponential", &RELAXES),
+        Law::new("slip against viscosity", &RELAXES),
     ],
     needs: &[Need::Vibration],
     change: |law, theta, _, _, c| {
         c.viscous_slip = law == 2;
         match law {
             0 => (c.inverse_recovery_speed, c.recovery_knee) = (theta[0], theta[1]),
-            _ => c.lateral_relaxation_time = theta[0],
+            _ => (c.lateral_relaxation_time, c.relaxation_growth) = (theta[0], theta[1]),
         }
     },
     ..Effect::NONE

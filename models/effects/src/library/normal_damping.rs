@@ -2,14 +2,18 @@
 
 use super::prelude::*;
 
+/// A dashpot of skin is seldom linear: by what power of the plate's peak speed its retardation time goes, one in
+/// a square law, less than zero where it thins with shear.
+const THICKENS: Parameter = Parameter::signed("plate_speed_exponent", "1", 0.4, -1.0, 1.5).bending();
+
 pub(super) static EFFECT: Effect = Effect {
     name: "normal_damping",
     place: Location::Contact,
     summary: "A dashpot beside the normal spring changes how long, and how hard, ridge and plate touch.",
     source: "Kelvin-Voigt normal spring; damping ratios 0.05 to 1 of ridges at 26 to 114 kHz; Friesen 2016",
     laws: &[
-        Law::new("Kelvin-Voigt", &[Parameter::positive("retardation_time", "s", 4e-6, 1e-4)]),
-        Law::new("constant loss factor", &[Parameter::positive("loss_factor", "1", 0.6, 10.0)]),
+        Law::new("Kelvin-Voigt", &[Parameter::positive("retardation_time", "s", 4e-6, 1e-4), THICKENS]),
+        Law::new("constant loss factor", &[Parameter::positive("loss_factor", "1", 0.6, 10.0), THICKENS]),
         // Storage and loss at the vibration's frequency of a spring beside a spring and dashpot in series.
         Law::new(
             "standard linear solid",
@@ -21,11 +25,13 @@ pub(super) static EFFECT: Effect = Effect {
     ],
     near: &["ridge_inertia"],
     needs: &[Need::Vibration],
-    change: |law, theta, _, _, c| {
+    change: |law, theta, _, design, c| {
         let omega = 2.0 * std::f64::consts::PI * c.frequency;
+        let speed =
+            || c.amplitude_pp * c.frequency / (design.largest_amplitude_m * design.reference_frequency_hz);
         c.normal_retardation_time = match law {
-            0 => theta[0],
-            1 => theta[0] / omega,
+            0 => theta[0] * power(speed(), theta[1]),
+            1 => theta[0] / omega * power(speed(), theta[1]),
             _ => {
                 let x = omega * theta[1];
                 let storage = 1.0 + theta[0] * x * x / (1.0 + x * x);
@@ -36,3 +42,8 @@ pub(super) static EFFECT: Effect = Effect {
     },
     ..Effect::NONE
 };
+
+/// A power that is one where there is nothing to raise: a still plate is not damped.
+fn power(x: f64, exponent: f64) -> f64 {
+    if exponent == 0.0 || x <= 0.0 { 1.0 } else { x.powf(exponent) }
+}

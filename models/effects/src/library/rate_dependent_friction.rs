@@ -5,6 +5,10 @@ use super::prelude::*;
 /// Most by which a curve changes mu0, in e-folds: beyond the speeds of a table a polynomial runs away.
 const MOST_E_FOLDS: f64 = 2.0;
 
+/// Stribeck's curve is one over speed by load (Hersey); how much of the load it feels, a soft contact that grows
+/// with its load decides.
+const HERSEY: Parameter = Parameter::signed("load_exponent_of_speed", "1", 0.3, -1.0, 1.0).bending();
+
 pub(super) static EFFECT: Effect = Effect {
     name: "rate_dependent_friction",
     place: Location::Contact,
@@ -17,6 +21,7 @@ pub(super) static EFFECT: Effect = Effect {
             &[
                 Parameter::signed("static_excess", "1", 0.4, -0.8, 3.0),
                 Parameter::shape("stribeck_speed", "m/s", 0.025, 0.8),
+                HERSEY,
             ],
         ),
         // Thermally activated sliding; the first term of rate-and-state friction.
@@ -28,6 +33,7 @@ pub(super) static EFFECT: Effect = Effect {
                 Parameter::signed("exponent", "1", 0.12, -0.6, 0.8),
                 Parameter::signed("bend_per_e_fold", "1", 0.7, -5.0, 5.0).bending(),
                 Parameter::signed("change_of_bend_per_e_fold", "1", 0.4, -3.0, 3.0).bending(),
+                HERSEY,
             ],
         ),
     ],
@@ -35,15 +41,20 @@ pub(super) static EFFECT: Effect = Effect {
     needs: &[Need::Speeds],
     change: |law, theta, _, design, c| {
         let reference = design.reference_speed_m_s;
+        // The speed that does the same at the reference load.
+        let speed = |exponent: f64| match exponent {
+            0.0 => c.speed,
+            e => c.speed * (c.normal_force / design.reference_load_n).powf(-e),
+        };
         c.mu0 *= match law {
             0 => (c.speed / reference).powf(theta[0]),
             1 => {
                 let part = |u: f64| 1.0 + theta[0] * (-(u / theta[1]).powi(2)).exp();
-                part(c.speed)
+                part(speed(theta[2]))
             }
             2 => (1.0 + theta[0] * (c.speed / reference).ln()).max(0.05),
             _ => {
-                let x = (c.speed / reference).ln();
+                let x = (speed(theta[3]) / reference).ln();
                 (theta[0] * x * (1.0 + x * (theta[1] + x * theta[2])))
                     .clamp(-MOST_E_FOLDS, MOST_E_FOLDS)
                     .exp()

@@ -10,6 +10,9 @@ const CHECK: &str = "Retune the drive (sweep its frequency) at the start and the
 const PER_KELVIN: Parameter = Parameter::positive("detuning_per_kelvin", "1/K", 0.15, 5.0);
 const DETUNING: Parameter = Parameter::positive("detuning", "1", 1.0, 12.0);
 const TIME: Parameter = Parameter::shape("time_constant_over_duration", "1", 0.7, 1.0);
+/// Resonators in a row that drift together, as a plate and the amplifier's matching: one has the Lorentzian, many have
+/// Gauss's curve.
+const STEEPNESS: Parameter = Parameter::shape("steepness", "1", 1.0, 0.7).bending();
 
 pub(super) static EFFECT: Effect = Effect {
     name: "resonance_detuning",
@@ -47,6 +50,9 @@ pub(super) static EFFECT: Effect = Effect {
                 TIME,
                 Parameter::signed("tuning_point", "1", 0.3, -2.0, 2.0),
                 Parameter::signed("softening_at_largest_amplitude", "1", 0.3, -3.0, 3.0),
+                STEEPNESS,
+                // A plate that is left alone between runs cools.
+                Parameter::positive("share_of_time_in_run", "1", 0.4, 1.0).bending(),
             ],
         )
         .seen_by(CHECK, 0.05),
@@ -54,7 +60,11 @@ pub(super) static EFFECT: Effect = Effect {
     acts: Some(Acts { on: Input::Amplitude, over: &[&covariate::TIME] }),
     needs: &[Need::Vibration],
     change: |law, theta, pass, design, c| {
-        let faded = || (-pass.time_s / (theta[1] * design.duration_s.max(1e-9))).exp_m1();
+        let time_s = match (law, theta) {
+            (5, &[_, _, _, _, _, share]) => pass.time_s + share * (pass.time_in_run_s() - pass.time_s),
+            _ => pass.time_s,
+        };
+        let faded = || (-time_s / (theta[1] * design.duration_s.max(1e-9))).exp_m1();
         if law == 3 {
             c.amplitude_pp /= 1.0 - theta[0] * faded();
             return;
@@ -71,7 +81,10 @@ pub(super) static EFFECT: Effect = Effect {
             4 => theta[0] * (warmer() - theta[1] + theta[2] * swing),
             _ => theta[0] * (-faded() - theta[2] + theta[3] * swing),
         };
-        c.amplitude_pp /= (1.0 + off * off).sqrt();
+        c.amplitude_pp /= match (law, theta) {
+            (5, &[_, _, _, _, steepness, _]) => (1.0 + off * off / steepness).powf(0.5 * steepness),
+            _ => (1.0 + off * off).sqrt(),
+        };
     },
     ..Effect::NONE
 };

@@ -3,10 +3,17 @@
 use super::prelude::*;
 
 /// Beyond critical damping a ridge does not fly, it lags: that is loss in the skin, whatever the mass.
+const MOST_DAMPED: f64 = 1.0;
+
 const FLIGHT: &[Parameter] = &[
     Parameter::positive("mass", "kg", 4e-6, 40e-6),
-    Parameter::shape("damping_ratio", "1", 0.5, 0.7).at_most(1.0),
+    Parameter::shape("damping_ratio", "1", 0.5, 0.7).at_most(MOST_DAMPED),
+    // A damping of the square grows with the plate's speed; one that thins with shear falls.
+    Parameter::signed("plate_speed_exponent", "1", 0.2, -1.0, 1.5).bending(),
 ];
+
+/// Peak speeds of the plate over the design's largest at which a damping ratio still changes.
+const SPEEDS: [f64; 2] = [0.05, 2.0];
 
 pub(super) static EFFECT: Effect = Effect {
     name: "ridge_inertia",
@@ -16,11 +23,21 @@ pub(super) static EFFECT: Effect = Effect {
     laws: &[Law::new("landing without rebound", FLIGHT), Law::new("rebounding", FLIGHT)],
     interpolation_error: crate::contact::impact::STATED_ERROR,
     needs: &[Need::Vibration],
-    change: |law, theta, _, _, c| {
+    change: |law, theta, _, design, c| {
         c.mass = theta[0];
-        c.ridge_damping_ratio = theta[1];
+        let speed =
+            c.amplitude_pp * c.frequency / (design.largest_amplitude_m * design.reference_frequency_hz);
+        c.ridge_damping_ratio = damping_ratio(theta, speed);
         c.landing = law;
     },
-    prepare: |law, theta| crate::contact::impact::prepare(law, theta[1]),
+    prepare: |law, theta| crate::contact::impact::prepare(law, SPEEDS.map(|s| damping_ratio(theta, s))),
     ..Effect::NONE
 };
+
+/// Damping ratio at a peak speed of the plate over the design's largest.
+fn damping_ratio(theta: &[f64], speed: f64) -> f64 {
+    match theta[2] {
+        0.0 => theta[1],
+        exponent => (theta[1] * speed.clamp(SPEEDS[0], SPEEDS[1]).powf(exponent)).min(MOST_DAMPED),
+    }
+}

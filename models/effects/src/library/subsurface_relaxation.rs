@@ -8,7 +8,11 @@ const ONE_TIME: &[Parameter] = &[
     Parameter::shape("time_constant", "s", 30.0, 1.5),
 ];
 /// Tissue has no single relaxation time: Kohlrausch's function, the usual one for a broad spectrum of times.
-const BROAD: &[Parameter] = &[ONE_TIME[0], ONE_TIME[1], Parameter::shape("exponent", "1", 0.6, 0.3)];
+const BROAD: &[Parameter] = &[ONE_TIME[0], ONE_TIME[1], Parameter::shape("exponent", "1", 0.6, 0.3), IN_RUN];
+/// Tissue that is left alone between runs recovers in part.
+const IN_RUN: Parameter = Parameter::positive("share_of_time_in_run", "1", 0.4, 1.0).bending();
+/// Those of a creep with one time constant and rests.
+const RESTED: &[Parameter] = &[ONE_TIME[0], ONE_TIME[1], IN_RUN];
 /// Those of a logarithmic creep.
 const LOGARITHMIC: &[Parameter] = &[
     Parameter::signed("relative_change_per_e_fold", "1", 0.12, -0.15, 1.5),
@@ -21,7 +25,7 @@ pub(super) static EFFECT: Effect = Effect {
     summary: "Creep of the soft tissue changes the stiffness of the contact with time, not its friction coefficient.",
     source: "longest relaxation time of a finger pad about 3 s (the paper's introduction); area grows as log t",
     laws: &[
-        Law::new("exponential creep", ONE_TIME),
+        Law::new("exponential creep", RESTED),
         Law::new("logarithmic creep", LOGARITHMIC),
         Law::new("normal stiffness alone", ONE_TIME),
         Law::new("normal stiffness alone, logarithmic", LOGARITHMIC),
@@ -31,10 +35,15 @@ pub(super) static EFFECT: Effect = Effect {
     acts: Some(Acts { on: Input::Stiffness, over: &[&covariate::TIME] }),
     needs: &[Need::Vibration, Need::Time],
     change: |law, theta, pass, _, c| {
+        let share_in_run = match (law, theta) {
+            (0, &[.., share]) | (4, &[.., share]) => share,
+            _ => 0.0,
+        };
+        let time = (pass.time_s + share_in_run * (pass.time_in_run_s() - pass.time_s)) / theta[1];
         let factor = match law {
-            1 | 3 => 1.0 + theta[0] * (1.0 + pass.time_s / theta[1]).ln(),
-            4 => 1.0 - theta[0] * (-(pass.time_s / theta[1]).powf(theta[2])).exp_m1(),
-            _ => 1.0 - theta[0] * (-pass.time_s / theta[1]).exp_m1(),
+            1 | 3 => 1.0 + theta[0] * (1.0 + time).ln(),
+            4 => 1.0 - theta[0] * (-time.powf(theta[2])).exp_m1(),
+            _ => 1.0 - theta[0] * (-time).exp_m1(),
         }
         .max(0.05);
         c.normal_stiffness *= factor;
