@@ -152,10 +152,9 @@ fn alias_class(fitted: &Fitted, leader: usize) -> Vec<usize> {
     class
 }
 
-/// Members of a leading pair that may be the only cause, with a form of their own. A smooth departure from
-/// the library's form, as large as known forms depart, then leaves next to nothing of the gap. That is enough
-/// if the pair's own forms depart too. If they do not, the evidence for the second cause must be small as
-/// well: such a second cause cannot be separated from another form of the first.
+/// Members of a leading pair that may be the only cause, with a form of their own: the evidence for the second
+/// cause is small, and a smooth departure from the library's form, as large as known forms depart, leaves little
+/// of the gap. Such a second cause cannot be separated from another form of the first.
 fn departed_singles(fitted: &Fitted, leader: usize) -> Vec<usize> {
     let candidates = &fitted.candidates;
     let (k, own) = (&*fitted.problem.constants, &candidates[leader]);
@@ -163,15 +162,9 @@ fn departed_singles(fitted: &Fitted, leader: usize) -> Vec<usize> {
         return Vec::new();
     }
     let gap = left(fitted, &fitted.none);
-    let departs = own.best.freedom.share > k.form_shares[0];
     let might = |i: usize| {
-        let behind = own.log_evidence - candidates[i].log_evidence;
-        let most = match (departs, behind < k.pair_own_form_nats) {
-            (true, _) => k.pair_departure,
-            (false, true) => k.pair_own_form,
-            (false, false) => return false,
-        };
-        left_by_a_form_of_its_own(fitted, &candidates[i]) < most.powi(2) * gap
+        own.log_evidence - candidates[i].log_evidence < k.pair_own_form_nats
+            && left_by_a_form_of_its_own(fitted, &candidates[i]) < k.pair_departure.powi(2) * gap
     };
     (0..candidates.len())
         .filter(|&i| candidates[i].effects.len() == 1 && own.effects.contains(&candidates[i].effects[0]))
