@@ -300,7 +300,8 @@ mod tests {
         let kernels = Kernels::on(&problem, Coordinates::of(&table), &[effect]);
         let basis = kernels.at(&problem.passes);
         let members = [Member { effect, law: 5 }];
-        let fit = minimise(&problem, &members, &[0.0, 0.0, 0.0, 0.3, 0.0, 0.5, 0.0], &problem.variance, 15);
+        let start = [0.0, 0.0, 0.0, 0.3, 0.0, 0.5, 0.0, 0.0, 0.0];
+        let fit = minimise(&problem, &members, &start, &problem.variance, 15);
         let large = Freedom::share(problem.constants.form_shares[2]);
         let alone = laplace(&problem, &members, &fit.u, &basis, large, 6);
         let bent = Freedom { share: problem.constants.form_shares[1], bend: problem.constants.bend_share };

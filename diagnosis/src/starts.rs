@@ -43,6 +43,8 @@ fn grid(parameters: &[Parameter], stroke: f64) -> Vec<Vec<f64>> {
     for (index, p) in parameters.iter().enumerate() {
         let (low, high) = p.coordinate_bounds();
         let values: Vec<f64> = match p.prior {
+            // A share has its middle at an end: the other side may have a mode of its own.
+            Prior::HalfNormal(_) if p.bends => vec![0.0, 1.0],
             _ if p.bends => vec![0.0],
             Prior::HalfNormal(_) if fine => vec![0.4, 1.5],
             Prior::HalfNormal(_) => vec![0.04, 0.12, 0.35, 0.9, 2.0, 4.5],

@@ -195,7 +195,7 @@ def _(c, d, e):
     c.mu = c.mu * (c.U / 0.02) ** e
 
 
-@law("rate_dependent_friction", (-0.8, 3), (2e-3, 0.2), (-1, 1))
+@law("rate_dependent_friction", (-0.8, 3), (2e-3, 0.2), (0, 0.6))
 def _(c, d, s, u, e):
     c.mu = c.mu * (1 + s * np.exp(-((c.U * (c.F / d.F_ref) ** -e / u) ** 2)))
 
@@ -205,7 +205,7 @@ def _(c, d, s):
     c.mu = c.mu * np.maximum(1 + s * np.log(c.U / 0.02), 0.05)
 
 
-@law("rate_dependent_friction", (-0.6, 0.8), (-5, 5), (-3, 3), (-1, 1))
+@law("rate_dependent_friction", (-0.6, 0.8), (-5, 5), (-3, 3), (0, 0.6))
 def _(c, d, s, bend, more, e):
     x = np.log(c.U / 0.02 * (c.F / d.F_ref) ** -e)
     c.mu = c.mu * np.exp(np.clip(s * x * (1 + x * (bend + x * more)), -2, 2))

@@ -5,9 +5,9 @@ use super::prelude::*;
 /// Most by which a curve changes mu0, in e-folds: beyond the speeds of a table a polynomial runs away.
 const MOST_E_FOLDS: f64 = 2.0;
 
-/// Stribeck's curve is one over speed by load (Hersey); how much of the load it feels, a soft contact that grows
-/// with its load decides.
-const HERSEY: Parameter = Parameter::signed("load_exponent_of_speed", "1", 0.3, -1.0, 1.0).bending();
+/// Stribeck's curve is one over speed by pressure (Hersey). The pressure of a soft contact grows with the cube root
+/// of its load (Hertz), of a rough one hardly.
+const HERSEY: Parameter = Parameter::positive("load_exponent_of_speed", "1", 0.3, 0.6).bending();
 
 pub(super) static EFFECT: Effect = Effect {
     name: "rate_dependent_friction",
@@ -48,10 +48,7 @@ pub(super) static EFFECT: Effect = Effect {
         };
         c.mu0 *= match law {
             0 => (c.speed / reference).powf(theta[0]),
-            1 => {
-                let part = |u: f64| 1.0 + theta[0] * (-(u / theta[1]).powi(2)).exp();
-                part(speed(theta[2]))
-            }
+            1 => 1.0 + theta[0] * (-(speed(theta[2]) / theta[1]).powi(2)).exp(),
             2 => (1.0 + theta[0] * (c.speed / reference).ln()).max(0.05),
             _ => {
                 let x = (speed(theta[3]) / reference).ln();
