@@ -152,9 +152,9 @@ fn alias_class(fitted: &Fitted, leader: usize) -> Vec<usize> {
     class
 }
 
-/// Members of a leading pair that may be the only cause, with a form of their own: the evidence for the second
-/// cause is small, and a smooth departure from the library's form, as large as known forms depart, leaves little
-/// of the gap. Such a second cause cannot be separated from another form of the first.
+/// Members of a leading pair that may be the only cause, with a form of their own: the evidence for the
+/// second is small, and a smooth departure from the library's form, as large as known forms depart, leaves
+/// little of the gap. Such a second cause cannot be separated from another form of the first.
 fn departed_singles(fitted: &Fitted, leader: usize) -> Vec<usize> {
     let candidates = &fitted.candidates;
     let (k, own) = (&*fitted.problem.constants, &candidates[leader]);

@@ -52,8 +52,8 @@ pub struct Contact {
     pub recovery_knee: f64,
     /// Relaxation time of the lateral stretch out of contact, s. 0 in the baseline.
     pub lateral_relaxation_time: f64,
-    /// Share of the rate of relaxation at [`sweep::STATED_STRETCH_M`] that goes in proportion to the stretch, below 1.
-    /// 0 in the baseline, where the rate is the same at any stretch.
+    /// Share of the rate of relaxation at [`sweep::STATED_STRETCH_M`] that goes in proportion to the stretch,
+    /// below 1. 0 in the baseline, where the rate is the same at any stretch.
     pub relaxation_growth: f64,
     /// Whether a stretch beyond the friction limit recovers towards the limit while the plate goes on drawing
     /// the skin along, in slip against viscosity (Perzyna); else it follows the limit down no faster than the

@@ -223,8 +223,8 @@ fn jkr_adds_four_pull_offs_at_no_load() {
     assert!((mean_friction(&c) - expected).abs() < 1e-12);
 }
 
-/// Slip against viscosity by small explicit steps of `x' = U - e/time (1 - g + g e/0.1 um)` with `e = x - limit`,
-/// which share nothing with the sweep's.
+/// Slip against viscosity by small explicit steps of `x' = U - e/time (1 - g + g e/0.1 um)` with
+/// `e = x - limit`, which share nothing with the sweep's.
 #[test]
 fn slip_against_viscosity_is_that_of_small_steps() {
     for (amplitude, speed, load, time, growth) in [

@@ -122,7 +122,7 @@ impl Lateral {
     fn new(c: &Contact, dt: f64, airborne: f64) -> Self {
         let rate =
             if c.inverse_recovery_speed > 0.0 { 1.0 / c.inverse_recovery_speed } else { f64::INFINITY };
-        // dx/dt = -x/time (1 - g + g x/stated): at a stretch of zero the rate is the share that does not grow.
+        // dx/dt = -x/time (1 - g + g x/stated): at no stretch the rate is the share that does not grow.
         let slow = c.lateral_relaxation_time / (1.0 - c.relaxation_growth);
         let growth = c.relaxation_growth / ((1.0 - c.relaxation_growth) * STATED_STRETCH_M);
         let grown = |time: f64| if growth > 0.0 { -growth * (-time / slow).exp_m1() } else { 0.0 };

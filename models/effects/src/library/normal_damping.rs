@@ -2,8 +2,8 @@
 
 use super::prelude::*;
 
-/// A dashpot of skin is seldom linear: by what power of the plate's peak speed its retardation time goes, one in
-/// a square law, less than zero where it thins with shear.
+/// A dashpot of skin is seldom linear: by what power of the plate's peak speed its retardation time goes,
+/// one in a square law, less than zero where it thins with shear.
 const THICKENS: Parameter = Parameter::signed("plate_speed_exponent", "1", 0.4, -1.0, 1.5).bending();
 
 pub(super) static EFFECT: Effect = Effect {

@@ -5,8 +5,8 @@ use super::prelude::*;
 /// Most by which a curve changes mu0, in e-folds: beyond the speeds of a table a polynomial runs away.
 const MOST_E_FOLDS: f64 = 2.0;
 
-/// Stribeck's curve is one over speed by pressure (Hersey). The pressure of a soft contact grows with the cube root
-/// of its load (Hertz), of a rough one hardly.
+/// Stribeck's curve is one over speed by pressure (Hersey). The pressure of a soft contact grows with the
+/// cube root of its load (Hertz), of a rough one hardly.
 const HERSEY: Parameter = Parameter::positive("load_exponent_of_speed", "1", 0.3, 0.6).bending();
 
 pub(super) static EFFECT: Effect = Effect {

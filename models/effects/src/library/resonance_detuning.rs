@@ -10,8 +10,8 @@ const CHECK: &str = "Retune the drive (sweep its frequency) at the start and the
 const PER_KELVIN: Parameter = Parameter::positive("detuning_per_kelvin", "1/K", 0.15, 5.0);
 const DETUNING: Parameter = Parameter::positive("detuning", "1", 1.0, 12.0);
 const TIME: Parameter = Parameter::shape("time_constant_over_duration", "1", 0.7, 1.0);
-/// Resonators in a row that drift together, as a plate and the amplifier's matching: one has the Lorentzian, many have
-/// Gauss's curve.
+/// Resonators in a row that drift together, as a plate and the amplifier's matching: one has the Lorentzian,
+/// many have Gauss's curve.
 const STEEPNESS: Parameter = Parameter::shape("steepness", "1", 1.0, 0.7).bending();
 
 pub(super) static EFFECT: Effect = Effect {

@@ -1,0 +1,27 @@
+//! Causes in a formula that the library does not have, by tests/peers/third_generator.py (`--seed 36113007`), which
+//! marches a spring-slider over the cycle and shares no code with this project.
+
+use models::rig_file::RigFile;
+use muprime_diagnosis::data::Table;
+use muprime_diagnosis::decision::Verdict;
+use muprime_diagnosis::hypotheses::Options;
+use muprime_diagnosis::verdict::diagnose;
+use rayon::prelude::*;
+use std::path::Path;
+
+/// A dashpot of the square, a recovery faster the further, a Stribeck curve over speed by load: `unknown`, unsure and
+/// two causes before the library's laws had a power or a share for it.
+#[test]
+fn a_cause_in_another_formula_is_named() {
+    let causes = ["normal_damping", "lateral_recovery", "rate_dependent_friction"];
+    causes.par_iter().for_each(|cause| {
+        let folder = Path::new(env!("CARGO_MANIFEST_DIR")).join("tests/forms").join(cause);
+        let text = |name: &str| std::fs::read_to_string(folder.join(name)).unwrap();
+        let passes = models::pass::read_passes(text("train.csv").as_bytes()).unwrap();
+        let table = Table::measured(&passes).unwrap();
+        let rig = RigFile::parse(&text("rig.toml")).unwrap();
+        let report = diagnose(&table, &rig, &Options::default(), String::new()).report;
+        assert_eq!(report.verdict, Verdict::Named, "{cause}: {}", report.text);
+        assert_eq!(report.hypotheses[0].effects, [*cause], "{}", report.text);
+    });
+}
