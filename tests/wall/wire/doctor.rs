@@ -213,7 +213,7 @@ fn the_doctor_goes_on_after_an_instrument_that_fails() {
         assert_eq!(code, Some(0), "{found:?}");
         let text = |i: usize| found[i]["found"].as_str().unwrap().to_string();
         assert!(text(0).contains("lateral -0.125") && text(0).contains("normal 0.2"), "{}", text(0));
-        assert!(text(1).contains("output off") && text(2).contains("at 12.500 mm"), "{found:?}");
+        assert!(text(1).contains("output off") && text(2).contains("at 12.5 mm"), "{found:?}");
 
         let (code, found) = doctor(&setup(folder.path(), &force(&nobody), &nobody, &address));
         assert_eq!(code, Some(1));
