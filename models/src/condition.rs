@@ -85,6 +85,11 @@ impl Condition {
         self.run_time_s.unwrap_or(self.time_s)
     }
 
+    /// The clock of what recovers between runs in part, s: this share of it starts again with each run.
+    pub fn time_with_rests_s(&self, share: f64) -> f64 {
+        self.time_s + share * (self.time_in_run_s() - self.time_s)
+    }
+
     /// The first value that no model can work with, by name, or `Ok`.
     ///
     /// # Errors

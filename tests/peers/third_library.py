@@ -131,7 +131,7 @@ def retarded(c, a, tau):
 
 def plate_speed(c, d):
     """Peak speed of the plate over that of the largest amplitude at the reference frequency."""
-    return np.maximum(c.w * c.f / (d.w_top * d.f_ref), 1e-9)
+    return np.clip(c.w * c.f / (d.w_top * d.f_ref), 0.05, 2)
 
 
 @law("normal_damping", (3e-8, 1e-4), (-1, 1.5))
@@ -269,7 +269,7 @@ for _nodes in MEDIANS.values():
 
 
 def creeping(log, both):
-    """A change of stiffness over time, of which a share begins anew in each run."""
+    """A change of stiffness over time, of which a share starts again in each run."""
     def act(c, d, s, tau, in_run=0.0, power=1.0):
         t = d.t + in_run * (d.trun - d.t)
         share = np.log1p(t / tau) if log else -np.expm1(-((t / tau) ** power))
@@ -522,7 +522,7 @@ def inertia_left(fit, rng):
     for landing in (1.0, 0.2):
         def act(c, d, mass, zeta, e):
             critical = 2 * np.sqrt(c.kn * mass)
-            zeta = np.minimum(zeta * np.clip(plate_speed(c, d), 0.05, 2) ** e, 1.0)
+            zeta = np.minimum(zeta * plate_speed(c, d) ** e, 1.0)
             c.mean = lambda c: bounce(c, mass, zeta * critical, 0.0, 60.0, 2 * landing * np.sqrt(60 * c.kn * mass),
                                       0.0, 40, 12)
         centre, width = np.array([np.log(8e-6), np.log(0.45), 0.2]), np.array([1.15, 1.0, 0.7])

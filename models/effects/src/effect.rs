@@ -70,8 +70,8 @@ pub struct Parameter {
     pub lower: f64,
     /// Largest value that the fit may take.
     pub upper: f64,
-    /// Whether it only bends the law about its middle, where the coordinate is zero: a search begins there,
-    /// and the local fit finds it.
+    /// Whether it only bends the law about its middle, where the coordinate is zero: a search begins there
+    /// (one that cannot be negative also a deviation above), and the local fit finds it.
     pub bends: bool,
 }
 

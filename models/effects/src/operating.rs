@@ -22,6 +22,20 @@ pub struct Design {
     pub largest_amplitude_m: f64,
 }
 
+/// Peak speeds of the plate over a design's largest between which laws follow it: a power runs away beyond.
+pub(crate) const PLATE_SPEEDS: [f64; 2] = [0.05, 2.0];
+
+impl Design {
+    /// Peak speed of the plate over that at the largest amplitude and the reference frequency, from 0.05 to 2;
+    /// 1 for a design without vibration.
+    pub fn plate_speed(&self, contact: &Contact) -> f64 {
+        let largest = self.largest_amplitude_m * self.reference_frequency_hz;
+        let speed = contact.amplitude_pp * contact.frequency / largest;
+        // A design without vibration has no largest one.
+        if largest > 0.0 { speed.clamp(PLATE_SPEEDS[0], PLATE_SPEEDS[1]) } else { 1.0 }
+    }
+}
+
 /// The parameters of the baseline: all that recalibration may move.
 #[derive(Debug, Clone, Copy, PartialEq, serde::Serialize, serde::Deserialize, schemars::JsonSchema)]
 pub struct Baseline {

@@ -204,6 +204,18 @@ fn tabulated_angle_balances_the_load() {
     assert!(worst < 2e-6, "{worst:e}");
 }
 
+/// A share of no recovery is nothing, also where another law asks for the sweep and the contact never ends.
+#[test]
+fn a_recovery_without_size_changes_no_sweep() {
+    for (amplitude, load) in [(0.2e-6, 0.5), (3e-6, 0.25)] {
+        let c = Contact { load_exponent: -0.1, ..contact(amplitude, 0.02, load, 1e6, 0.4e6) };
+        for relaxation_growth in [0.3, 0.99] {
+            let with = mean_friction(&Contact { relaxation_growth, ..c });
+            assert!(with.to_bits() == mean_friction(&c).to_bits(), "{with}");
+        }
+    }
+}
+
 /// A knee far below the stretch is the plain rate limit.
 #[test]
 fn a_hard_knee_is_the_plain_rate_limit() {

@@ -1,7 +1,7 @@
 //! Every effect nests the baseline: at the zero of its size the prediction is the baseline's, bit for bit.
 use models::condition::Condition;
 use models::quantity::{Direction, PeakToPeak};
-use muprime_effects::{Active, Baseline, Design, known, library};
+use muprime_effects::{Active, Baseline, Design, Parameter, known, library};
 
 fn passes() -> Vec<Condition> {
     let mut list = Vec::new();
@@ -47,8 +47,9 @@ fn zero_is_the_baseline() {
         for (law, form) in effect.laws.iter().enumerate() {
             assert!(form.parameters[0].zero == Some(0.0), "{}: the size comes first", effect.name);
             for shape in [-2.0, 0.0, 1.7] {
-                let theta: Vec<f64> =
-                    form.parameters.iter().map(|p| p.zero.unwrap_or_else(|| p.value(shape))).collect();
+                // What only bends a law may have any value: the size alone takes the effect away.
+                let value = |p: &Parameter| p.zero.filter(|_| !p.bends).unwrap_or_else(|| p.value(shape));
+                let theta: Vec<f64> = form.parameters.iter().map(value).collect();
                 for pass in passes() {
                     let with = muprime_effects::lateral_force(
                         &baseline,

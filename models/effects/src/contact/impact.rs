@@ -346,21 +346,27 @@ fn slide<const N: usize>(
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::{Active, Baseline, Design, by_name, lateral_force};
+    use crate::{Active, Baseline, Design, Effect, by_name, lateral_force};
     use models::condition::Condition;
     use models::quantity::PeakToPeak;
 
-    fn made() -> usize {
-        table(0).iter().filter(|node| node.get().is_some()).count()
-    }
-
-    /// The control loop asks a prepared model for any condition: no node may be made there, which takes milliseconds.
+    /// The control loop asks a prepared model for any condition: no node may be made there, which takes milliseconds. One
+    /// law with a damping that is the same at any speed of the plate, and one with a power of it.
     #[test]
     fn a_prepared_table_makes_no_node_when_asked() {
-        let damping_ratio = 0.35;
-        prepare(0, [damping_ratio; 2]);
-        let before = made();
-        assert_eq!(before, 2 * LOAD.count * RATIO.count);
+        let effect = by_name("ridge_inertia").expect("an effect of the library");
+        for (law, exponent, dampings) in [(0, 0.0, 2), (1, 0.6, 6)] {
+            let made = || table(law).iter().filter(|node| node.get().is_some()).count();
+            (effect.prepare)(law, &[1e-5, 0.35, exponent]);
+            let before = made();
+            assert_eq!(before, dampings * LOAD.count * RATIO.count);
+            assert!(changed_passes(effect, law, exponent) > 50);
+            assert_eq!(made(), before);
+        }
+    }
+
+    /// Passes of a wide grid on which a mass changes the friction by more than a per cent.
+    fn changed_passes(effect: &'static Effect, law: usize, exponent: f64) -> usize {
         let baseline = Baseline { mu0: 0.5, normal_stiffness_n_per_m: 1.2e6, lateral_stiffness_n_per_m: 4e5 };
         let design = Design {
             duration_s: 100.0,
@@ -371,7 +377,6 @@ mod tests {
             stroke_m: 0.0,
             largest_amplitude_m: 1e-5,
         };
-        let effect = by_name("ridge_inertia").expect("an effect of the library");
         let mut changed = 0;
         for amplitude_pp_m in [0.0, 1e-8, 0.5e-6, 2e-6, 1e-5] {
             for frequency_hz in [20e3, 33e3, 100e3] {
@@ -386,8 +391,8 @@ mod tests {
                                 normal_force_n,
                                 ..Condition::paper()
                             };
-                            let theta = [mass_kg, damping_ratio, 0.0];
-                            let active = [Active { effect, law: 0, theta: &theta }];
+                            let theta = [mass_kg, 0.35, exponent];
+                            let active = [Active { effect, law, theta: &theta }];
                             let with = lateral_force(&baseline, &active, &pass, &design);
                             let without = lateral_force(&baseline, &[], &pass, &design);
                             changed += usize::from((with / without - 1.0).abs() > 0.01);
@@ -396,7 +401,6 @@ mod tests {
                 }
             }
         }
-        assert!(changed > 50, "{changed}");
-        assert_eq!(made(), before);
+        changed
     }
 }

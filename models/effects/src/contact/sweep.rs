@@ -125,7 +125,7 @@ impl Lateral {
         // dx/dt = -x/time (1 - g + g x/stated): at no stretch the rate is the share that does not grow.
         let slow = c.lateral_relaxation_time / (1.0 - c.relaxation_growth);
         let growth = c.relaxation_growth / ((1.0 - c.relaxation_growth) * STATED_STRETCH_M);
-        let grown = |time: f64| if growth > 0.0 { -growth * (-time / slow).exp_m1() } else { 0.0 };
+        let grown = |time: f64| if slow > 0.0 { -growth * (-time / slow).exp_m1() } else { 0.0 };
         let keep = |time: f64| {
             if time < 1e-15 {
                 1.0
@@ -163,15 +163,13 @@ impl Lateral {
             self.contact(limits, start, |x, before, limit| {
                 let excess = (x - before).max(0.0);
                 let added = self.advance - (limit - before) + (x - before).min(0.0);
-                (limit + excess * self.keep_step / (1.0 + self.grown_step * excess) + added * self.drawn)
-                    .max(limit)
+                (limit + relaxed(excess, self.keep_step, self.grown_step) + added * self.drawn).max(limit)
             })
         } else if self.knee > 0.0 && self.rate_step.is_finite() {
             self.contact(limits, start, |x, _, limit| softened(x, self.rate_step, self.knee).max(limit))
         } else if self.grown_step > 0.0 {
             self.contact(limits, start, |x, _, limit| {
-                let excess = x - limit;
-                (limit + excess * self.keep_step / (1.0 + self.grown_step * excess)).max(limit)
+                (limit + relaxed(x - limit, self.keep_step, self.grown_step)).max(limit)
             })
         } else {
             self.contact(limits, start, |x, _, limit| {
@@ -216,8 +214,13 @@ impl Lateral {
         if self.knee > 0.0 && self.rate_airborne.is_finite() {
             return softened(x, self.rate_airborne, self.knee).max(0.0);
         }
-        (x * self.keep_airborne / (1.0 + self.grown_airborne * x) - self.rate_airborne).max(0.0)
+        (relaxed(x, self.keep_airborne, self.grown_airborne) - self.rate_airborne).max(0.0)
     }
+}
+
+/// What is left of a stretch that relaxes by a factor, and by more the longer it is.
+fn relaxed(x: f64, keep: f64, grown: f64) -> f64 {
+    x * keep / (1.0 + grown * x)
 }
 
 /// Share of a stretch that is little to lose in one step.

@@ -27,11 +27,9 @@ pub(super) static EFFECT: Effect = Effect {
     needs: &[Need::Vibration],
     change: |law, theta, _, design, c| {
         let omega = 2.0 * std::f64::consts::PI * c.frequency;
-        let speed =
-            || c.amplitude_pp * c.frequency / (design.largest_amplitude_m * design.reference_frequency_hz);
         c.normal_retardation_time = match law {
-            0 => theta[0] * power(speed(), theta[1]),
-            1 => theta[0] / omega * power(speed(), theta[1]),
+            0 => theta[0] * design.plate_speed(c).powf(theta[1]),
+            1 => theta[0] / omega * design.plate_speed(c).powf(theta[1]),
             _ => {
                 let x = omega * theta[1];
                 let storage = 1.0 + theta[0] * x * x / (1.0 + x * x);
@@ -42,8 +40,3 @@ pub(super) static EFFECT: Effect = Effect {
     },
     ..Effect::NONE
 };
-
-/// A power that is one where there is nothing to raise: a still plate is not damped.
-fn power(x: f64, exponent: f64) -> f64 {
-    if exponent == 0.0 || x <= 0.0 { 1.0 } else { x.powf(exponent) }
-}

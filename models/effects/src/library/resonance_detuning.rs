@@ -60,11 +60,11 @@ pub(super) static EFFECT: Effect = Effect {
     acts: Some(Acts { on: Input::Amplitude, over: &[&covariate::TIME] }),
     needs: &[Need::Vibration],
     change: |law, theta, pass, design, c| {
-        let time_s = match (law, theta) {
-            (5, &[_, _, _, _, _, share]) => pass.time_s + share * (pass.time_in_run_s() - pass.time_s),
-            _ => pass.time_s,
+        let (steepness, rests) = match *theta {
+            [.., steepness, rests] if law == 5 => (steepness, rests),
+            _ => (1.0, 0.0),
         };
-        let faded = || (-time_s / (theta[1] * design.duration_s.max(1e-9))).exp_m1();
+        let faded = || (-pass.time_with_rests_s(rests) / (theta[1] * design.duration_s.max(1e-9))).exp_m1();
         if law == 3 {
             c.amplitude_pp /= 1.0 - theta[0] * faded();
             return;
@@ -81,10 +81,7 @@ pub(super) static EFFECT: Effect = Effect {
             4 => theta[0] * (warmer() - theta[1] + theta[2] * swing),
             _ => theta[0] * (-faded() - theta[2] + theta[3] * swing),
         };
-        c.amplitude_pp /= match (law, theta) {
-            (5, &[_, _, _, _, steepness, _]) => (1.0 + off * off / steepness).powf(0.5 * steepness),
-            _ => (1.0 + off * off).sqrt(),
-        };
+        c.amplitude_pp /= (1.0 + off * off / steepness).powf(0.5 * steepness);
     },
     ..Effect::NONE
 };

@@ -1,6 +1,7 @@
 //! The ridges have mass: they are thrown off and fly.
 
 use super::prelude::*;
+use crate::operating::PLATE_SPEEDS;
 
 /// Beyond critical damping a ridge does not fly, it lags: that is loss in the skin, whatever the mass.
 const MOST_DAMPED: f64 = 1.0;
@@ -12,9 +13,6 @@ const FLIGHT: &[Parameter] = &[
     Parameter::signed("plate_speed_exponent", "1", 0.2, -1.0, 1.5).bending(),
 ];
 
-/// Peak speeds of the plate over the design's largest at which a damping ratio still changes.
-const SPEEDS: [f64; 2] = [0.05, 2.0];
-
 pub(super) static EFFECT: Effect = Effect {
     name: "ridge_inertia",
     place: Location::Contact,
@@ -25,19 +23,14 @@ pub(super) static EFFECT: Effect = Effect {
     needs: &[Need::Vibration],
     change: |law, theta, _, design, c| {
         c.mass = theta[0];
-        let speed =
-            c.amplitude_pp * c.frequency / (design.largest_amplitude_m * design.reference_frequency_hz);
-        c.ridge_damping_ratio = damping_ratio(theta, speed);
+        c.ridge_damping_ratio = damping_ratio(theta, design.plate_speed(c));
         c.landing = law;
     },
-    prepare: |law, theta| crate::contact::impact::prepare(law, SPEEDS.map(|s| damping_ratio(theta, s))),
+    prepare: |law, theta| crate::contact::impact::prepare(law, PLATE_SPEEDS.map(|s| damping_ratio(theta, s))),
     ..Effect::NONE
 };
 
 /// Damping ratio at a peak speed of the plate over the design's largest.
 fn damping_ratio(theta: &[f64], speed: f64) -> f64 {
-    match theta[2] {
-        0.0 => theta[1],
-        exponent => (theta[1] * speed.clamp(SPEEDS[0], SPEEDS[1]).powf(exponent)).min(MOST_DAMPED),
-    }
+    (theta[1] * speed.powf(theta[2])).min(MOST_DAMPED)
 }

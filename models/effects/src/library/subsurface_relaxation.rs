@@ -35,11 +35,8 @@ pub(super) static EFFECT: Effect = Effect {
     acts: Some(Acts { on: Input::Stiffness, over: &[&covariate::TIME] }),
     needs: &[Need::Vibration, Need::Time],
     change: |law, theta, pass, _, c| {
-        let share_in_run = match (law, theta) {
-            (0, &[.., share]) | (4, &[.., share]) => share,
-            _ => 0.0,
-        };
-        let time = (pass.time_s + share_in_run * (pass.time_in_run_s() - pass.time_s)) / theta[1];
+        let rests = if matches!(law, 0 | 4) { theta[theta.len() - 1] } else { 0.0 };
+        let time = pass.time_with_rests_s(rests) / theta[1];
         let factor = match law {
             1 | 3 => 1.0 + theta[0] * (1.0 + time).ln(),
             4 => 1.0 - theta[0] * (-time.powf(theta[2])).exp_m1(),
