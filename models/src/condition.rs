@@ -85,9 +85,11 @@ impl Condition {
         self.run_time_s.unwrap_or(self.time_s)
     }
 
-    /// The clock of what recovers between runs in part, s: this share of it starts again with each run.
-    pub fn time_with_rests_s(&self, share: f64) -> f64 {
-        self.time_s + share * (self.time_in_run_s() - self.time_s)
+    /// How long a change has gone on that the first pass of the table began, s; this share of its clock starts
+    /// again with each run. A pass before the first saw none of it: never negative.
+    pub fn elapsed_s(&self, share_in_run: f64) -> f64 {
+        let [all, run] = [self.time_s, self.time_in_run_s()].map(|t| t.max(0.0));
+        all + share_in_run * (run - all)
     }
 
     /// The first value that no model can work with, by name, or `Ok`.

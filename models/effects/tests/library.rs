@@ -206,3 +206,30 @@ fn every_law_can_be_made_ready_for_the_loop() {
         }
     }
 }
+
+/// A pass before the first of the table saw nothing of a change that the first pass began: no clock runs
+/// backwards, where an exponential has no bound and a power of time no value. A straight drift may go on.
+#[test]
+fn what_the_first_pass_began_was_not_under_way_before_it() {
+    let at = |effect: &'static Effect, law: usize, theta: &[f64], time_s: f64| -> Vec<f64> {
+        let active = [Active { effect, law, theta }];
+        let when = |p: Condition| Condition { time_s, run_time_s: Some(time_s), ..p };
+        passes().into_iter().map(|p| lateral_force(&BASELINE, &active, &when(p), &DESIGN)).collect()
+    };
+    let mut clocks = 0;
+    for effect in library() {
+        for (law, l) in effect.laws.iter().enumerate() {
+            let theta: Vec<f64> = l.parameters.iter().map(|p| p.value(0.8)).collect();
+            let [before, first, later] =
+                [-0.5, 0.0, 0.5].map(|share| at(effect, law, &theta, share * DESIGN.duration_s));
+            // A parabola through the table has no beginning.
+            if apart(&first, &later) == 0.0 || l.name == "offset with curved drift" {
+                continue;
+            }
+            clocks += 1;
+            let (grown, back) = (apart(&first, &later), apart(&first, &before));
+            assert!(back <= 1.001 * grown, "{} {}: {back} before, {grown} after", effect.name, l.name);
+        }
+    }
+    assert!(clocks > 10, "{clocks} laws follow time");
+}

@@ -48,7 +48,7 @@ pub(super) static EFFECT: Effect = Effect {
                 let warmer = pass.temperature_c.map_or(0.0, |t| t - design.reference_temperature_c);
                 theta[0] + theta[1] * warmer
             }
-            _ => -theta[0] * (-s / theta[1]).exp_m1(),
+            _ => -theta[0] * (-s.max(0.0) / theta[1]).exp_m1(),
         };
     },
     ..Effect::NONE

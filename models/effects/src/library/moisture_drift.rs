@@ -30,7 +30,7 @@ pub(super) static EFFECT: Effect = Effect {
     acts: Some(Acts { on: Input::Friction, over: &[&covariate::TIME] }),
     needs: &[Need::Time],
     change: |law, theta, pass, _, c| {
-        let time = if law == 3 { pass.time_in_run_s() } else { pass.time_s };
+        let time = pass.elapsed_s(if law == 3 { 1.0 } else { 0.0 });
         let factor = match law {
             2 => 1.0 + theta[0] * (1.0 + time / theta[1]).ln(),
             _ => 1.0 - theta[0] * (-time / theta[1]).exp_m1(),

@@ -64,7 +64,7 @@ pub(super) static EFFECT: Effect = Effect {
             [.., steepness, rests] if law == 5 => (steepness, rests),
             _ => (1.0, 0.0),
         };
-        let faded = || (-pass.time_with_rests_s(rests) / (theta[1] * design.duration_s.max(1e-9))).exp_m1();
+        let faded = || (-pass.elapsed_s(rests) / (theta[1] * design.duration_s.max(1e-9))).exp_m1();
         if law == 3 {
             c.amplitude_pp /= 1.0 - theta[0] * faded();
             return;

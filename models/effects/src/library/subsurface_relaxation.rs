@@ -36,7 +36,7 @@ pub(super) static EFFECT: Effect = Effect {
     needs: &[Need::Vibration, Need::Time],
     change: |law, theta, pass, _, c| {
         let rests = if matches!(law, 0 | 4) { theta[theta.len() - 1] } else { 0.0 };
-        let time = pass.time_with_rests_s(rests) / theta[1];
+        let time = pass.elapsed_s(rests) / theta[1];
         let factor = match law {
             1 | 3 => 1.0 + theta[0] * (1.0 + time).ln(),
             4 => 1.0 - theta[0] * (-time.powf(theta[2])).exp_m1(),
