@@ -73,7 +73,8 @@ pub fn decide(fitted: &mut Fitted) -> Decision {
     let (k, candidates) = (&*fitted.problem.constants, &fitted.candidates);
     if claimed {
         // An effect that cannot predict what it has not seen is no cause: its weight goes to the open set.
-        let survival = judged.survival(k, candidates[leader].best.freedom.share);
+        let own = &candidates[leader];
+        let survival = judged.survival(k, own.effects.len(), fitted.lead(own));
         for p in &mut probabilities {
             unknown += *p * (1.0 - survival);
             *p *= survival;
@@ -88,7 +89,9 @@ pub fn decide(fitted: &mut Fitted) -> Decision {
         && departed.is_empty();
     class.extend(departed);
     let of = |class: &[usize], p: &[f64]| class.iter().map(|&i| p[i]).sum::<f64>();
-    let leads = probabilities[leader] >= alone * of(&class, &probabilities);
+    // Half of the gap at least, whatever the evidence says.
+    let closes = judged.pooled >= k.region_closed;
+    let leads = closes && probabilities[leader] >= alone * of(&class, &probabilities);
     let (none, unknown) = doubted(fitted, none, unknown, &mut probabilities);
     let in_class = of(&class, &probabilities);
     let verdict = if !claimed || none >= in_class.max(unknown) {
@@ -119,6 +122,7 @@ fn doubted(fitted: &Fitted, none: f64, unknown: f64, probabilities: &mut [f64]) 
 fn judged(fitted: &mut Fitted, leader: usize, claimed: bool) -> (Vec<Region>, Gate) {
     let k = fitted.problem.constants.clone();
     let own = &fitted.candidates[leader];
+    let (effects, lead) = (own.effects.len(), fitted.lead(own));
     let top = own.laws.iter().map(|(e, _)| *e).fold(f64::NEG_INFINITY, f64::max);
     let near = own.laws.iter().filter(|(e, _)| claimed && *e > top - k.alias_nats);
     let mut laws: Vec<Posterior> = near.map(|(_, law)| law.clone()).collect();
@@ -128,7 +132,7 @@ fn judged(fitted: &mut Fitted, leader: usize, claimed: bool) -> (Vec<Region>, Ga
     let judge = |law: Posterior| {
         let regions = left_out_regions(fitted, &law);
         let gate = gate(&k, &regions);
-        (gate.survival(&k, law.freedom.share), law, regions, gate)
+        (gate.survival(&k, effects, lead), law, regions, gate)
     };
     let all = laws.into_iter().map(judge);
     let (_, law, regions, gate) =

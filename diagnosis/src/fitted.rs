@@ -142,12 +142,22 @@ impl Fitted {
             .sort_by(|a, b| b.log_probability.total_cmp(&a.log_probability).then(a.effects.cmp(&b.effects)));
     }
 
+    /// Log evidence of the open set over no gap's: a smooth map, or a structure that is described.
+    fn open_nats(&self) -> f64 {
+        let [none, smooth] = self.evidence;
+        (smooth - none).max(shapes::nats(&self.shapes))
+    }
+
+    /// Nats by which a candidate's evidence leads the open set's, and no gap's.
+    pub(crate) fn lead(&self, candidate: &Candidate) -> f64 {
+        candidate.log_evidence - self.evidence[0] - self.open_nats().max(0.0)
+    }
+
     /// Probabilities as they would be if the evidence counted for next to nothing: of no gap, of the open
     /// set, and of each cause. It is all that stands where the method errs without seeing it.
     pub(crate) fn coarse(&self) -> (f64, f64, Vec<f64>) {
         let k = &self.problem.constants;
-        let [none, smooth] = self.evidence;
-        let open = (smooth - none).max(shapes::nats(&self.shapes));
+        let (none, open) = (self.evidence[0], self.open_nats());
         let mut all = vec![k.prior_null.ln(), k.prior_open.ln() + open / k.doubt_temper];
         all.extend(
             self.candidates

@@ -272,11 +272,15 @@ pub struct Gate {
 
 impl Gate {
     /// Share of a candidate's probability that survives: one half where it closes just so much as a mimic
-    /// may, and ever less below that. `share` is the form uncertainty that it needed.
-    pub fn survival(&self, k: &Constants, share: f64) -> f64 {
-        let rank = k.form_shares.iter().filter(|s| **s < share * (1.0 - 1e-9)).count();
-        let middle = k.closure[rank.min(k.closure.len() - 1)];
-        let pooled = 1.0 / (1.0 + (-(self.pooled - middle) / k.closure_scale).exp());
+    /// may, and ever less below that.
+    ///
+    /// A single cause may close the less, the further its evidence leads that of the open set, by `lead` nats:
+    /// what imitates a cause outside of the library leads by little. Two causes imitate nearly anything, and
+    /// what they lead by says nothing.
+    pub fn survival(&self, k: &Constants, effects: usize, lead: f64) -> f64 {
+        let (two, fold) = (usize::from(effects > 1), k.closure_per_fold * lead.max(0.0).ln_1p());
+        let beyond = self.pooled + if two == 0 { fold } else { 0.0 } - k.closure[two];
+        let pooled = 1.0 / (1.0 + (-beyond / k.closure_scale[two]).exp());
         let half_open = 2 * self.closed < self.carrying && self.carrying >= k.few_regions;
         if half_open { pooled.min(k.half_open_survival) } else { pooled }
     }
@@ -323,10 +327,16 @@ mod tests {
     #[test]
     fn the_gate_is_open_where_causes_and_mimics_close_as_much() {
         let k = Constants::default();
-        let survives = |pooled: f64| Gate { pooled, carrying: 6, closed: 5 }.survival(&k, k.form_shares[1]);
-        assert!((0.05..0.95).contains(&survives(0.45)) && (0.05..0.95).contains(&survives(0.65)));
-        assert!(survives(0.1) < 0.01 && survives(0.95) > 0.99);
-        assert!(Gate { pooled: 0.95, carrying: 6, closed: 2 }.survival(&k, k.form_shares[1]) <= 0.1);
+        let survives =
+            |pooled: f64, effects, lead| Gate { pooled, carrying: 6, closed: 5 }.survival(&k, effects, lead);
+        for (effects, lead) in [(1, 20.0), (2, 20.0)] {
+            let [little, part, much] = [0.1, 0.55, 1.0].map(|pooled| survives(pooled, effects, lead));
+            assert!(little < 0.06 && (0.05..0.95).contains(&part) && much > 0.98, "{little} {part} {much}");
+        }
+        // Evidence makes up for what a foreign form leaves open; two causes get nothing for it.
+        assert!(survives(0.6, 1, 100.0) > 0.9 && survives(0.6, 1, 5.0) < 0.6);
+        assert_eq!(survives(0.6, 2, 100.0), survives(0.6, 2, 0.0));
+        assert!(Gate { pooled: 0.95, carrying: 6, closed: 2 }.survival(&k, 1, 100.0) <= 0.1);
     }
 
     /// One vibrating pass, predicted from passes with the plate still, which tell nothing of the stiffnesses:

@@ -9,11 +9,21 @@ use muprime_diagnosis::verdict::diagnose;
 use rayon::prelude::*;
 use std::path::Path;
 
+/// A standing wave of a disc's rings and a drive that folds back close 0.65 and 0.52 of the gap on left-out regions,
+/// as mimics of strangers do, and lead every description without a cause by 95 nats, as those do not.
+#[test]
+fn evidence_far_ahead_of_any_other_description_makes_up_for_a_foreign_form() {
+    named(&["mode_shape", "amplitude_saturation"]);
+}
+
 /// A dashpot of the square, a recovery faster the further, a Stribeck curve over speed by load: `unknown`, unsure and
 /// two causes before the library's laws had a power or a share for it.
 #[test]
 fn a_cause_in_another_formula_is_named() {
-    let causes = ["normal_damping", "lateral_recovery", "rate_dependent_friction"];
+    named(&["normal_damping", "lateral_recovery", "rate_dependent_friction"]);
+}
+
+fn named(causes: &[&str]) {
     causes.par_iter().for_each(|cause| {
         let folder = Path::new(env!("CARGO_MANIFEST_DIR")).join("tests/forms").join(cause);
         let text = |name: &str| std::fs::read_to_string(folder.join(name)).unwrap();

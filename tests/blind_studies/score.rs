@@ -55,6 +55,8 @@ struct Line {
     closure: f64,
     carrying: usize,
     closed: usize,
+    /// Of each region: its name, passes, mean squares of baseline and cause, whether it judges and is informed.
+    regions: Vec<(String, usize, f64, f64, bool, bool)>,
     achieved: Option<f64>,
     claimed_ci95: Option<[f64; 2]>,
     structure: Option<String>,
@@ -141,6 +143,15 @@ fn score(folder: &Path, options: &Options, changes: &[Constants]) -> Result<Line
         closure: report.left_out.pooled_closure,
         carrying: report.left_out.carrying,
         closed: report.left_out.closed,
+        regions: result
+            .decision
+            .regions
+            .iter()
+            .map(|r| {
+                let e = &r.errors;
+                (r.name.clone(), e.passes, e.recalibrated, e.after, r.judges, r.informed)
+            })
+            .collect(),
         achieved: (before > 0.0).then(|| 1.0 - (after / before).sqrt()),
         claimed_ci95: report.gap.shrinkage_ci95,
         structure: fitted.structure.as_ref().map(|s| format!("{} p {:.1e}", s.place, s.p)),
