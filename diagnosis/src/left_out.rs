@@ -278,9 +278,11 @@ impl Gate {
     /// what imitates a cause outside of the library leads by little. Two causes imitate nearly anything, and
     /// what they lead by says nothing.
     pub fn survival(&self, k: &Constants, effects: usize, lead: f64) -> f64 {
-        let (two, fold) = (usize::from(effects > 1), k.closure_per_fold * lead.max(0.0).ln_1p());
-        let beyond = self.pooled + if two == 0 { fold } else { 0.0 } - k.closure[two];
-        let pooled = 1.0 / (1.0 + (-beyond / k.closure_scale[two]).exp());
+        let two = usize::from(effects > 1);
+        let open = |closure: f64| 1.0 - closure.min(1.0) + k.closure_rest;
+        let closed = (open(k.closure[two]) / open(self.pooled)).powf(k.closure_power[two]);
+        let odds = if two == 0 { closed * (1.0 + lead.max(0.0)) } else { closed };
+        let pooled = odds / (1.0 + odds);
         let half_open = 2 * self.closed < self.carrying && self.carrying >= k.few_regions;
         if half_open { pooled.min(k.half_open_survival) } else { pooled }
     }
@@ -329,12 +331,12 @@ mod tests {
         let k = Constants::default();
         let survives =
             |pooled: f64, effects, lead| Gate { pooled, carrying: 6, closed: 5 }.survival(&k, effects, lead);
-        for (effects, lead) in [(1, 20.0), (2, 20.0)] {
-            let [little, part, much] = [0.1, 0.55, 1.0].map(|pooled| survives(pooled, effects, lead));
-            assert!(little < 0.06 && (0.05..0.95).contains(&part) && much > 0.98, "{little} {part} {much}");
+        for effects in [1, 2] {
+            let [little, part, much] = [0.1, 0.55, 1.0].map(|pooled| survives(pooled, effects, 3.0));
+            assert!(little < 0.1 && (0.05..0.95).contains(&part) && much > 0.99, "{little} {part} {much}");
         }
         // Evidence makes up for what a foreign form leaves open; two causes get nothing for it.
-        assert!(survives(0.6, 1, 100.0) > 0.9 && survives(0.6, 1, 5.0) < 0.6);
+        assert!(survives(0.6, 1, 100.0) > 0.9 && survives(0.6, 1, 3.0) < 0.6);
         assert_eq!(survives(0.6, 2, 100.0), survives(0.6, 2, 0.0));
         assert!(Gate { pooled: 0.95, carrying: 6, closed: 2 }.survival(&k, 1, 100.0) <= 0.1);
     }
