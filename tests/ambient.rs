@@ -399,7 +399,7 @@ fn the_pressure_steps_name_the_squeeze_film_and_leave_the_ideal_rig_alone() {
         (&film["verdict"], &film["hypotheses"][0]["effects"][0]),
         (&"named".into(), &"squeeze_film".into())
     );
-    assert!(film["hypotheses"][0]["probability"].as_f64().unwrap() > 0.99, "{}", film["hypotheses"]);
+    assert!(film["hypotheses"][0]["probability"].as_f64().unwrap() > 0.98, "{}", film["hypotheses"]);
     let first = &film["where"]["regions"][0];
     assert!(first["bounds"]["ambient_pressure_pa"][0].as_f64().unwrap() > 45_000.0, "{first}");
     assert!(first["share_of_gap"].as_f64().unwrap() > 0.3, "{first}");
