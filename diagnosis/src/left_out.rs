@@ -274,9 +274,9 @@ impl Gate {
     /// Share of a candidate's probability that survives: one half where it closes just so much as a mimic
     /// may, and ever less below that.
     ///
-    /// A single cause may close the less, the further its evidence leads that of the open set, by `lead` nats:
-    /// what imitates a cause outside of the library leads by little. Two causes imitate nearly anything, and
-    /// what they lead by says nothing.
+    /// A single cause may close the less, the further its evidence leads the open set's, by `lead` nats: what
+    /// imitates a cause outside of the library leads by little. Two causes imitate nearly anything, and what
+    /// they lead by says nothing.
     pub fn survival(&self, k: &Constants, effects: usize, lead: f64) -> f64 {
         let two = usize::from(effects > 1);
         let open = |closure: f64| 1.0 - closure.min(1.0) + k.closure_rest;

@@ -9,8 +9,8 @@ use muprime_diagnosis::verdict::diagnose;
 use rayon::prelude::*;
 use std::path::Path;
 
-/// A standing wave of a disc's rings and a drive that folds back close 0.65 and 0.52 of the gap on left-out regions,
-/// as mimics of strangers do, and lead every description without a cause by 95 nats, as those do not.
+/// A standing wave of a disc's rings and a drive that folds back close 0.65 and 0.52 of the gap on left-out
+/// regions, as mimics of strangers do. They lead all descriptions without a cause by 95 nats; mimics do not.
 #[test]
 fn evidence_far_ahead_of_any_other_description_makes_up_for_a_foreign_form() {
     named(&["mode_shape", "amplitude_saturation"]);

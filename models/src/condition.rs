@@ -85,8 +85,8 @@ impl Condition {
         self.run_time_s.unwrap_or(self.time_s)
     }
 
-    /// How long a change has gone on that the first pass of the table began, s; this share of its clock starts
-    /// again with each run. A pass before the first saw none of it: never negative.
+    /// How long a change has gone on that the first pass of the table began, s; this share of its clock
+    /// starts again with each run. A pass before the first saw none of it: never negative.
     pub fn elapsed_s(&self, share_in_run: f64) -> f64 {
         let [all, run] = [self.time_s, self.time_in_run_s()].map(|t| t.max(0.0));
         all + share_in_run * (run - all)

@@ -55,7 +55,7 @@ struct Line {
     closure: f64,
     carrying: usize,
     closed: usize,
-    /// Of each region: its name, passes, mean squares of baseline and cause, whether it judges and is informed.
+    /// Of each region: name, passes, mean squares of baseline and cause, whether it judges and is informed.
     regions: Vec<(String, usize, f64, f64, bool, bool)>,
     achieved: Option<f64>,
     claimed_ci95: Option<[f64; 2]>,
