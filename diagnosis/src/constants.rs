@@ -97,8 +97,8 @@ const FAR: f64 = f64::INFINITY;
 const JUDGEMENT: &str = "judgement: chosen without a measurement";
 const NUMERICAL: &str = "numerical: effort of a search";
 const CONTRACT: &str = "contract";
-const MIMICS: &str = "development: 243 single causes of the simulation under other formulae, 101 pairs, 127 causes outside \
-    of the library";
+const LEADERS: &str = "development: 184 leading single causes of two generators, 166 of them true (logistic \
+    regression, rounded); 101 pairs";
 
 constants! {
     Fit {
@@ -183,8 +183,8 @@ constants! {
     region_allowance_sd: f64 = 2.0, "Deviations of its sampling error that a region's rest is granted before it counts as open.", "two standard deviations";
     pooled_allowance_sd: f64 = 3.0, "The same for the pool of regions, which overlap: each pass counts about four times.", JUDGEMENT;
     region_closed: f64 = 0.5, "Share of its gap from which a region counts as closed.", CONTRACT;
-    closure: [f64; 2] = [0.77, 0.55], "Pooled closure at which a cause and a mimic are as likely: one cause that leads the open set by nothing, two causes.", MIMICS;
-    closure_power: [f64; 2] = [3.0, 6.0], "Power of the share left open by which those odds fall: one cause, two.", "development: logistic regression over 184 leading single causes of two generators, 166 of them true";
+    closure: [f64; 2] = [0.77, 0.55], "Pooled closure at which a cause and a mimic are as likely: one cause that leads the open set by nothing, two causes.", LEADERS;
+    closure_power: [f64; 2] = [3.0, 6.0], "Power of the share left open by which those odds fall: one cause, two.", LEADERS;
     closure_rest: f64 = 0.02, "Share left open that closing everything counts as.", JUDGEMENT;
     half_open_survival: f64 = 0.1, "Largest share of the probability that survives where fewer than half of the regions are closed.", "contract asks for half of the regions; the value is judgement";
     few_regions: usize = 3, "Number of carrying regions below which their count says nothing.", JUDGEMENT;

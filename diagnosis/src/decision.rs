@@ -68,13 +68,11 @@ pub fn decide(fitted: &mut Fitted) -> Decision {
         return Decision { verdict, none, unknown, probabilities, class, gate, regions };
     };
     let claimed = none < fitted.problem.constants.claim_probability;
-    let (regions, judged) = judged(fitted, leader, claimed);
+    let (regions, judged, survival) = judged(fitted, leader, claimed);
     let fitted = &*fitted;
     let (k, candidates) = (&*fitted.problem.constants, &fitted.candidates);
     if claimed {
         // An effect that cannot predict what it has not seen is no cause: its weight goes to the open set.
-        let own = &candidates[leader];
-        let survival = judged.survival(k, own.effects.len(), fitted.lead(own));
         for p in &mut probabilities {
             unknown += *p * (1.0 - survival);
             *p *= survival;
@@ -118,8 +116,9 @@ fn doubted(fitted: &Fitted, none: f64, unknown: f64, probabilities: &mut [f64]) 
 
 /// The leader on the left-out regions. Of its laws that the evidence does not tell apart the one that
 /// predicts best what it has not seen stands for the cause: which of them is a tenth of a nat ahead is no
-/// ground to doubt the cause. Where no gap is claimed there is nothing to choose for.
-fn judged(fitted: &mut Fitted, leader: usize, claimed: bool) -> (Vec<Region>, Gate) {
+/// ground to doubt the cause. Where no gap is claimed there is nothing to choose for. The last number is the
+/// share of the probability that survives.
+fn judged(fitted: &mut Fitted, leader: usize, claimed: bool) -> (Vec<Region>, Gate, f64) {
     let k = fitted.problem.constants.clone();
     let own = &fitted.candidates[leader];
     let (effects, lead) = (own.effects.len(), fitted.lead(own));
@@ -135,10 +134,10 @@ fn judged(fitted: &mut Fitted, leader: usize, claimed: bool) -> (Vec<Region>, Ga
         (gate.survival(&k, effects, lead), law, regions, gate)
     };
     let all = laws.into_iter().map(judge);
-    let (_, law, regions, gate) =
+    let (survival, law, regions, gate) =
         all.reduce(|a, b| if b.0 > a.0 { b } else { a }).expect("a candidate has a law");
     fitted.candidates[leader].best = law;
-    (regions, gate)
+    (regions, gate, survival)
 }
 
 /// The leader and every hypothesis of its size that the data does not tell from it.

@@ -335,6 +335,11 @@ mod tests {
             let [little, part, much] = [0.1, 0.55, 1.0].map(|pooled| survives(pooled, effects, 3.0));
             assert!(little < 0.1 && (0.05..0.95).contains(&part) && much > 0.99, "{little} {part} {much}");
         }
+        // What a name needs, as docs/diagnosis/rules.md has it.
+        for (pooled, lead) in [(0.75, 10.0), (0.64, 30.0), (0.5, 80.0)] {
+            let named = survives(pooled, 1, lead);
+            assert!((named - 0.9).abs() < 0.005, "{named} at {lead} nats");
+        }
         // Evidence makes up for what a foreign form leaves open; two causes get nothing for it.
         assert!(survives(0.6, 1, 100.0) > 0.9 && survives(0.6, 1, 3.0) < 0.6);
         assert_eq!(survives(0.6, 2, 100.0), survives(0.6, 2, 0.0));
