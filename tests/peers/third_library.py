@@ -10,6 +10,7 @@ from types import SimpleNamespace
 
 import numpy as np
 from scipy.optimize import least_squares
+from scipy.special import j0
 from third_generator import ARC, COLUMNS, HALF, THETA, bisect, bounce, deviations, evaluate, recalibrated, rows, turning
 
 LAWS = {}
@@ -224,10 +225,11 @@ def _(c, d, fa):
     c.press = press
 
 
-@law("adhesion", (1e-3, 1))
-def _(c, d, fa):
+@law("adhesion", (1e-3, 1), (1e-8, 1e-5))
+def _(c, d, fa, tau):
     touching = np.minimum(contact_time(c) * c.f, 1)
-    c.mu = c.mu * (1 + fa * touching / c.F)
+    times = touching / (tau * c.f)
+    c.mu = c.mu * (1 + fa * np.where(c.w > 0, touching * (1 + np.expm1(-times) / times), 1) / c.F)
 
 
 @law("adhesion", (1e-3, 1), (4e-3, 0.4), (-0.4, 0.4))
@@ -241,6 +243,17 @@ def _(c, d, fa, scale, e):
 def _(c, d, fc):
     fc = np.asarray(fc).reshape(-1, 1)
     c.limit = lambda c, q, age: c.mu[:, None] * np.where(q > 0, q + 2 * fc + 2 * np.sqrt(fc * (q + fc)), 0)
+
+
+@law("adhesion", (1e-3, 1), (2e-8, 1e-5))
+def _(c, d, fa, reach):
+    half = np.maximum(c.w, 1e-12) / 2
+
+    def over(load):
+        lift_off = np.cos(np.interp(load / c.kn / half, ARC, HALF))
+        gap = np.maximum(lift_off[:, None] - np.cos(THETA), 0) * half[:, None]
+        return load - c.F - fa * (1 / (1 + gap / reach) ** 2).mean(1)
+    c.F = bisect(c.F, c.F + fa, over, 30)
 
 
 def drifting(time, log, softens=0.0):
@@ -268,6 +281,12 @@ for _nodes in MEDIANS.values():
     law("multi_asperity", (1e-8, 6e-6))(_heights)
 
 
+@law("multi_asperity", (1e-8, 1.2e-5), (0.1, 0.9))
+def _(c, d, step, low):
+    step = np.broadcast_to(step, c.w.shape)
+    c.heights = [(1 - low, step, 0.0), (low, step, -1.0)]
+
+
 def creeping(log, both):
     """A change of stiffness over time, of which a share starts again in each run."""
     def act(c, d, s, tau, in_run=0.0, power=1.0):
@@ -293,6 +312,17 @@ def stiffer(normal, lateral):
 
 for _pair in ((0, 1), (1, 0), (1, 1)):
     law("stiffness_error", (-2, 2))(stiffer(*_pair))
+
+
+@law("stiffness_error", (-2, 2), (-1, 1), (-1, 1))
+def _(c, d, s, growth, lateral):
+    s = s * (1 + growth * np.log(c.F / d.F_ref))
+    c.kn, c.kl = c.kn * np.exp(s), c.kl * np.exp(s * (1 + lateral))
+
+
+@law("stiffness_error", (-0.7, 1))
+def _(c, d, power):
+    c.kn, c.kl = c.kn * (c.F / d.F_ref) ** power, c.kl * (c.F / d.F_ref) ** power
 
 
 @law("amplitude_miscalibration", (-1.5, 1.5))
@@ -365,6 +395,12 @@ def _(c, d, depth, spacing, phase, e, sharp, over, edge):
 @law("mode_shape", (50, 4e4), (-1, 2))
 def _(c, d, fall, centre):
     c.w = c.w / (1 + fall * (d.x - centre * 0.036) ** 2)
+
+
+@law("mode_shape", (0.03, 1), (0.004, 0.03), (-1, 2), (0, 1), (-1, 1))
+def _(c, d, depth, spacing, centre, e, over):
+    ring = j0(np.pi * (d.x - centre * 0.036) * (c.f / d.f_ref) ** e / spacing)
+    c.w = c.w * np.sqrt(np.maximum(1 - depth * (1 - ring**2), 4e-4)) * np.exp(depth * over)
 
 
 @law("mode_shape", (-60, 60))

@@ -8,6 +8,7 @@
 //! ([`mean_friction`]); laws that change the limit within the cycle take the sweep of [`sweep`].
 
 pub mod asperities;
+pub(crate) mod gap;
 pub mod impact;
 mod retarded;
 mod stick;

@@ -173,10 +173,27 @@ fn friction_is_continuous_at_the_onset() {
 fn asperities_of_one_height_are_one_slider() {
     for w in [0.5e-6, 2e-6] {
         let c = contact(w, 0.02, 0.25, 1e6, 0.4e6);
-        for asperity_heights in [Heights::Gaussian, Heights::Exponential, Heights::Even] {
+        for asperity_heights in [Heights::Gaussian, Heights::Exponential, Heights::Even, Heights::Two(0.3)] {
             let many = Contact { asperity_height: 1e-12, asperity_heights, ..c };
             assert!((relative(&many) - relative(&c)).abs() < 1e-4);
         }
+    }
+}
+
+/// Where the lower ones are out of reach, two heights are one slider on the springs of the upper ones.
+#[test]
+fn of_two_heights_far_apart_the_upper_ones_carry() {
+    for (share, w, f) in [(0.3, 2e-6, 0.25), (0.8, 6e-6, 0.1), (0.5, 0.4e-6, 0.3)] {
+        let c = contact(w, 0.02, f, 1e6, 0.4e6);
+        let two = Contact { asperity_height: 1e-4, asperity_heights: Heights::Two(share), ..c };
+        let (normal_stiffness, lateral_stiffness) = (1e6 * (1.0 - share), 0.4e6 * (1.0 - share));
+        let upper = Contact { normal_stiffness, lateral_stiffness, ..c };
+        assert!(
+            (relative(&two) - relative(&upper)).abs() < 1e-4,
+            "{share}: {} {}",
+            relative(&two),
+            relative(&upper)
+        );
     }
 }
 

@@ -1,7 +1,8 @@
 //! Adhesion loads the contact beyond what the normal force does, and holds it until it is pulled off.
 
 use super::prelude::*;
-use crate::contact::Attraction;
+use crate::contact::{Attraction, STILL_PLATE_M, gap, half_contact_angle};
+use std::f64::consts::PI;
 
 const FORCE: Parameter = Parameter::positive("adhesive_force", "N", 0.06, 1.0);
 
@@ -9,10 +10,14 @@ pub(super) static EFFECT: Effect = Effect {
     name: "adhesion",
     place: Location::Contact,
     summary: "The friction limit is mu0 (F + Fa), and contact lasts until the spring pulls with Fa.",
-    source: "Derjaguin, Muller, Toporov 1975; Johnson, Kendall, Roberts 1971; capillary and van der Waals pull of tens of mN on a finger",
+    source: "Derjaguin, Muller, Toporov 1975; Johnson, Kendall, Roberts 1971; capillary and van der Waals pull of tens of mN on a finger; \
+             between a sphere and a plane it falls with the inverse square of the distance (Israelachvili 2011)",
     laws: &[
         Law::new("DMT", &[FORCE]),
-        Law::new("constant shear on the touching time", &[FORCE]),
+        Law::new(
+            "constant shear on the touching time",
+            &[FORCE, Parameter::shape("build_up_time", "s", 3e-7, 1.5).bending()],
+        ),
         Law::new(
             "developing with the momentary load",
             &[
@@ -23,6 +28,7 @@ pub(super) static EFFECT: Effect = Effect {
             ],
         ),
         Law::new("JKR", &[Parameter::positive("pull_off_force", "N", 0.015, 0.5)]),
+        Law::new("across the gap", &[FORCE, Parameter::shape("reach", "m", 3e-7, 1.2)]),
     ],
     near: &["normal_offset"],
     needs: &[Need::Loads],
@@ -31,8 +37,8 @@ pub(super) static EFFECT: Effect = Effect {
             0 => c.adhesion = theta[0],
             1 => {
                 // Added friction for the share of the cycle in which the surfaces touch.
-                let touching = if c.amplitude_pp > crate::contact::STILL_PLATE_M {
-                    crate::contact::half_contact_angle(c.load_ratio(), 0.0) / std::f64::consts::PI
+                let touching = if c.amplitude_pp > STILL_PLATE_M {
+                    built_up(half_contact_angle(c.load_ratio(), 0.0) / PI, theta[1] * c.frequency)
                 } else {
                     1.0
                 };
@@ -43,8 +49,16 @@ pub(super) static EFFECT: Effect = Effect {
                 let force = theta[0] * (c.speed / design.reference_speed_m_s).powf(theta[2]);
                 c.attraction = Attraction::Developing { force, scale: theta[1] };
             }
-            _ => c.attraction = Attraction::Jkr { pull_off: theta[0] },
+            3 => c.attraction = Attraction::Jkr { pull_off: theta[0] },
+            _ => c.normal_force = gap::carried(c, theta[0], theta[1]),
         }
     },
     ..Effect::NONE
 };
+
+/// Mean over a cycle of an attraction that is fully there after some `time` of contact, in periods, with the
+/// surfaces touching for a share of each.
+fn built_up(touching: f64, time: f64) -> f64 {
+    let times = touching / time.max(1e-9);
+    if times < 1e-3 { 0.5 * touching * times } else { touching * (1.0 + (-times).exp_m1() / times) }
+}

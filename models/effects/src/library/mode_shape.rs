@@ -1,6 +1,7 @@
 //! The plate's amplitude is not the same everywhere.
 
 use super::prelude::*;
+use libm::j0;
 use std::f64::consts::PI;
 
 /// What sees it without friction.
@@ -13,7 +14,7 @@ pub(super) static EFFECT: Effect = Effect {
     name: "mode_shape",
     place: Location::Plate,
     summary: "Nodes and antinodes: the amplitude depends on where on the plate the finger is.",
-    source: "flexural half-wave of 6 to 14 mm for 1 to 2 mm plates at 25 to 60 kHz",
+    source: "flexural half-wave of 6 to 14 mm for 1 to 2 mm plates at 25 to 60 kHz; away from its edge a round plate moves as J0 of the radius",
     laws: &[
         Law::new(
             "standing wave",
@@ -42,6 +43,17 @@ pub(super) static EFFECT: Effect = Effect {
             ],
         )
         .seen_by(CHECK, 130.0),
+        Law::new(
+            "rings of a disc",
+            &[
+                Parameter::positive("depth", "1", 0.5, 1.0),
+                Parameter::between("ring_spacing_at_reference", "m", 0.004, 0.03),
+                Parameter::between("centre_over_stroke", "1", -1.0, 2.0),
+                Parameter::between("frequency_exponent", "1", 0.0, 1.0).bending(),
+                Parameter::signed("centre_over_calibrated_e_folds", "1", 0.3, -1.0, 1.0).bending(),
+            ],
+        )
+        .seen_by(CHECK, 0.03),
         Law::new("gradient", &[Parameter::signed("gradient", "1/m", 10.0, -60.0, 60.0)]).seen_by(CHECK, 1.0),
     ],
     acts: Some(Acts { on: Input::Amplitude, over: &[&covariate::POSITION, &covariate::FREQUENCY] }),
@@ -57,6 +69,12 @@ pub(super) static EFFECT: Effect = Effect {
                 (1.0 - depth * s * s).max(LEAST_SQUARE).powf(theta[4]) * (depth * theta[5]).exp()
             }
             1 => 1.0 / (1.0 + theta[0] * (x - theta[1] * design.stroke_m).powi(2)),
+            2 => {
+                let shorter = (pass.frequency_hz / design.reference_frequency_hz).powf(theta[3]);
+                let ring = j0(PI * (x - theta[2] * design.stroke_m) * shorter / theta[1]);
+                let depth = theta[0].min(1.0);
+                (1.0 - depth * (1.0 - ring * ring)).max(LEAST_SQUARE).sqrt() * (depth * theta[4]).exp()
+            }
             _ => (theta[0] * (x - 0.5 * design.stroke_m)).clamp(-2.0, 2.0).exp(),
         };
     },

@@ -12,6 +12,13 @@ pub(super) static EFFECT: Effect = Effect {
         Law::new("Gaussian heights", &[Parameter::positive("height_sd", "m", 0.5e-6, 6e-6)]),
         Law::new("exponential heights", &[Parameter::positive("height_scale", "m", 0.5e-6, 6e-6)]),
         Law::new("even heights", &[Parameter::positive("height_sd", "m", 0.5e-6, 6e-6)]),
+        Law::new(
+            "two heights",
+            &[
+                Parameter::positive("height_step", "m", 1e-6, 12e-6),
+                Parameter::between("lower_share", "1", 0.1, 0.9).bending(),
+            ],
+        ),
     ],
     needs: &[Need::Vibration, Need::Amplitudes],
     change: |law, theta, _, _, c| {
@@ -19,7 +26,8 @@ pub(super) static EFFECT: Effect = Effect {
         c.asperity_heights = match law {
             0 => Heights::Gaussian,
             1 => Heights::Exponential,
-            _ => Heights::Even,
+            2 => Heights::Even,
+            _ => Heights::Two(theta[1]),
         };
     },
     ..Effect::NONE

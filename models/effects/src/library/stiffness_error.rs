@@ -2,11 +2,15 @@
 
 use super::prelude::*;
 
+/// Loads below this share of the reference load change the stiffness no further.
+const LEAST_LOAD: f64 = 1e-3;
+
 pub(super) static EFFECT: Effect = Effect {
     name: "stiffness_error",
     place: Location::Finger,
     summary: "Normal or lateral stiffness lies outside the range that its calibration states.",
-    source: "spread of ultrasonic stiffness in the paper (0.2 to 4 MN/m); rig.toml's prior is the nuisance",
+    source: "spread of ultrasonic stiffness in the paper (0.2 to 4 MN/m); rig.toml's prior is the nuisance; \
+             a Hertzian contact's stiffness grows with the cube root of the load",
     laws: &[
         Law::new("lateral stiffness", &[Parameter::signed("log_lateral_factor", "1", 0.5, -2.0, 2.0)])
             .acts_as([0.0, 0.0, 1.0]),
@@ -14,18 +18,35 @@ pub(super) static EFFECT: Effect = Effect {
             .acts_as([0.0, 1.0, 0.0]),
         Law::new("both", &[Parameter::signed("log_common_factor", "1", 0.5, -2.0, 2.0)])
             .acts_as([0.0, 1.0, 1.0]),
+        // A power of the load leads away from where the certificate holds, and the two need not err alike.
+        Law::new(
+            "both, certified at another load",
+            &[
+                Parameter::signed("log_normal_factor", "1", 0.5, -2.0, 2.0),
+                Parameter::signed("growth_per_e_fold_of_load", "1", 0.3, -1.0, 1.0).bending(),
+                Parameter::signed("lateral_over_normal_e_folds", "1", 0.3, -1.0, 1.0).bending(),
+            ],
+        ),
+        Law::new("both, growing with the load", &[Parameter::signed("load_exponent", "1", 0.25, -0.7, 1.0)])
+            .needs(&[Need::Loads]),
     ],
     near: &["speed_error", "amplitude_miscalibration", "subsurface_relaxation"],
     acts: Some(Acts { on: Input::Stiffness, over: &[&covariate::NORMAL_FORCE] }),
     needs: &[Need::Vibration],
-    change: |law, theta, _, _, c| {
-        let factor = theta[0].exp();
-        if law != 1 {
-            c.lateral_stiffness *= factor;
-        }
-        if law != 0 {
-            c.normal_stiffness *= factor;
-        }
+    change: |law, theta, _, design, c| {
+        let load_e_folds = (c.normal_force / design.reference_load_n).max(LEAST_LOAD).ln();
+        let [normal, lateral] = match law {
+            0 => [0.0, theta[0]],
+            1 => [theta[0], 0.0],
+            2 => [theta[0]; 2],
+            3 => {
+                let normal = theta[0] * (1.0 + theta[1] * load_e_folds);
+                [normal, normal * (1.0 + theta[2])]
+            }
+            _ => [theta[0] * load_e_folds; 2],
+        };
+        c.normal_stiffness *= normal.exp();
+        c.lateral_stiffness *= lateral.exp();
     },
     ..Effect::NONE
 };
