@@ -24,8 +24,8 @@ pub enum Heights {
 const SHARES: usize = 9;
 
 impl Heights {
-    /// Heights in units of the scale, about a mean of zero, with the share of asperities at each, and how many
-    /// there are. Of a distribution they are the medians of equal shares.
+    /// Heights in units of the scale, about a mean of zero, with the share of asperities at each, and how
+    /// many there are. Of a distribution they are the medians of equal shares.
     ///
     /// Equal shares rather than quadrature nodes: as the plate takes leave of one asperity after another, a
     /// node of half the weight would leave at once.
