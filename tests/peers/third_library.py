@@ -229,7 +229,7 @@ def _(c, d, fa):
 def _(c, d, fa, tau):
     touching = np.minimum(contact_time(c) * c.f, 1)
     times = touching / (tau * c.f)
-    c.mu = c.mu * (1 + fa * np.where(c.w > 0, touching * (1 + np.expm1(-times) / times), 1) / c.F)
+    c.mu = c.mu * (1 + fa * np.where((c.w > 0) & (touching < 1), touching * (1 + np.expm1(-times) / times), 1) / c.F)
 
 
 @law("adhesion", (1e-3, 1), (4e-3, 0.4), (-0.4, 0.4))

@@ -233,3 +233,38 @@ fn what_the_first_pass_began_was_not_under_way_before_it() {
     }
     assert!(clocks > 10, "{clocks} laws follow time");
 }
+
+/// What laws of one quantity do is a change of that quantity: a Hertzian stiffness goes with the cube root of the
+/// load; rings follow J0 (zero at 2.404826, -0.402759 at 3.831706: Abramowitz and Stegun, table 9.5); an
+/// attraction that builds up is all there in a contact that never breaks.
+#[test]
+fn laws_change_what_they_state_by_their_formula() {
+    let force = |baseline: &Baseline, name: &str, law: &str, theta: &[f64], pass: &Condition| {
+        let effect = *library().iter().find(|e| e.name == name).unwrap();
+        let law = effect.laws.iter().position(|l| l.name == law).unwrap();
+        lateral_force(baseline, &[Active { effect, law, theta }], pass, &DESIGN)
+    };
+    let same = |a: f64, b: f64| assert!((a / b - 1.0).abs() < 1e-5, "{a} {b}");
+    let moving = |um: f64| Condition { amplitude: PeakToPeak::from_metres(um * 1e-6), ..Condition::paper() };
+    let hertz = ((Condition::paper().normal_force_n * 1.7) / DESIGN.reference_load_n).cbrt();
+    let stiffer = Baseline {
+        normal_stiffness_n_per_m: BASELINE.normal_stiffness_n_per_m * hertz,
+        lateral_stiffness_n_per_m: BASELINE.lateral_stiffness_n_per_m * hertz,
+        ..BASELINE
+    };
+    let pass = Condition { normal_force_n: Condition::paper().normal_force_n * 1.7, ..moving(2.0) };
+    let growing = force(&BASELINE, "stiffness_error", "both, growing with the load", &[1.0 / 3.0], &pass);
+    same(growing, lateral_force(&stiffer, &[], &pass, &DESIGN));
+    for (argument, share) in [(2.404_826, 0.02), (3.831_706, 0.402_759), (0.0, 1.0)] {
+        let position_m = 0.01 * argument / std::f64::consts::PI;
+        let at = |um| Condition { position_m, frequency_hz: DESIGN.reference_frequency_hz, ..moving(um) };
+        let ring = force(&BASELINE, "mode_shape", "rings of a disc", &[1.0, 0.01, 0.0, 0.5, 0.0], &at(4.0));
+        same(ring, lateral_force(&BASELINE, &[], &at(4.0 * share), &DESIGN));
+    }
+    let law = "constant shear on the touching time";
+    let [unbroken, parted] = [0.01, 0.5].map(|um| {
+        [1e-9, 1e-5].map(|time| force(&BASELINE, "adhesion", law, &[0.1, time], &moving(um)).abs())
+    });
+    same(unbroken[0], unbroken[1]);
+    assert!(parted[1] < 0.99 * parted[0], "{parted:?}");
+}

@@ -57,8 +57,11 @@ pub(super) static EFFECT: Effect = Effect {
 };
 
 /// Mean over a cycle of an attraction that is fully there after some `time` of contact, in periods, with the
-/// surfaces touching for a share of each.
+/// surfaces touching for a share of each. Where they never part all of it is there.
 fn built_up(touching: f64, time: f64) -> f64 {
+    if touching >= 1.0 {
+        return 1.0;
+    }
     let times = touching / time.max(1e-9);
     if times < 1e-3 { 0.5 * touching * times } else { touching * (1.0 + (-times).exp_m1() / times) }
 }
