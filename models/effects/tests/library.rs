@@ -234,8 +234,8 @@ fn what_the_first_pass_began_was_not_under_way_before_it() {
     assert!(clocks > 10, "{clocks} laws follow time");
 }
 
-/// What laws of one quantity do is a change of that quantity: a Hertzian stiffness goes with the cube root of the
-/// load; rings follow J0 (zero at 2.404826, -0.402759 at 3.831706: Abramowitz and Stegun, table 9.5); an
+/// What laws of one quantity do is a change of that quantity: a Hertzian stiffness goes with the cube root of
+/// the load; rings follow J0 (zero at 2.404826, -0.402759 at 3.831706: Abramowitz and Stegun, table 9.5); an
 /// attraction that builds up is all there in a contact that never breaks.
 #[test]
 fn laws_change_what_they_state_by_their_formula() {
