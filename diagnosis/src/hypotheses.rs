@@ -230,8 +230,9 @@ fn sought_again(problem: &Problem, singles: &mut [Candidate], pairs: &[Candidate
     }
 }
 
-/// Pairs, where the best single leaves something: one that leaves nothing needs no second cause, unless it is the
-/// stiffnesses that took it up, or the open set is ahead of it: what it leaves may be less than runs shift by.
+/// Pairs, where the best single leaves something by its law: one that leaves nothing needs no second cause, unless it
+/// is the stiffnesses that took it up, or the open set is ahead of it: what it leaves may be less than runs shift by.
+/// What a function that may be any took up beside the law may be a second cause.
 fn second_causes(
     problem: &Problem,
     singles: &[Candidate],
@@ -239,7 +240,7 @@ fn second_causes(
     search: &Search<'_>,
     open: f64,
 ) -> Vec<Candidate> {
-    let best = &singles[0].best;
+    let best = singles[0].best.by_law();
     let behind = open - singles[0].log_evidence;
     let misfit = problem.misfit(&best.mechanism) + best.pull();
     let n = problem.len() as f64;

@@ -1,4 +1,4 @@
-//! Causes in a formula that the library does not have, by tests/peers/third_generator.py (`--seed 36113007`), which
+//! Causes in a formula that the library does not have, by tests/peers/third_generator.py (`--seed 36113007` unless said), which
 //! marches a spring-slider over the cycle and shares no code with this project.
 
 use models::rig_file::RigFile;
@@ -23,6 +23,14 @@ fn a_cause_in_another_formula_is_named() {
     named(&["normal_damping", "lateral_recovery", "rate_dependent_friction"]);
 }
 
+/// A plate of rings with a pick-up that has a floor (`--seed 36113231`, set 122): one law of rings with a function beside
+/// it leaves no more than scatter does, and was named alone. By its law it leaves 17 deviations, and two causes are
+/// 44 nats ahead.
+#[test]
+fn what_a_bent_law_takes_up_is_sought_as_a_second_cause() {
+    named(&["amplitude_miscalibration+mode_shape"]);
+}
+
 fn named(causes: &[&str]) {
     causes.par_iter().for_each(|cause| {
         let folder = Path::new(env!("CARGO_MANIFEST_DIR")).join("tests/forms").join(cause);
@@ -32,6 +40,8 @@ fn named(causes: &[&str]) {
         let rig = RigFile::parse(&text("rig.toml")).unwrap();
         let report = diagnose(&table, &rig, &Options::default(), String::new()).report;
         assert_eq!(report.verdict, Verdict::Named, "{cause}: {}", report.text);
-        assert_eq!(report.hypotheses[0].effects, [*cause], "{}", report.text);
+        let mut effects = report.hypotheses[0].effects.clone();
+        effects.sort_unstable();
+        assert_eq!(effects.join("+"), *cause, "{}", report.text);
     });
 }

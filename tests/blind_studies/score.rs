@@ -3,11 +3,15 @@
 //!
 //! Every folder in `FOLDER` holds `train.csv`, `rig.toml`, `conditions.csv` and `truth.json`: `cause`
 //! (names; none for no gap; `outside the library`), `detectable`, and `hidden` (noise-free force and full
-//! friction by point). One line a set goes to `LINES.json`, with everything that was fitted; what is
+//! friction by point). `noise_free` (forces of the training passes by point), where it is there, says how far
+//! the cause is from the library, and whether another imitates it (`decidable.rs`). One line a set goes to `LINES.json`, with everything that was fitted; what is
 //! printed is their summary.
 #![allow(clippy::disallowed_methods, reason = "it says how long each set took")]
 #![allow(missing_docs, reason = "a study, not a library")]
 
+mod decidable;
+
+use decidable::{NoiseFree, Oracle, oracle};
 use diagnosis::constants::Constants;
 use diagnosis::data::{RigFile, Table};
 use diagnosis::decision::decide;
@@ -28,6 +32,8 @@ struct Truth {
     cause: Vec<String>,
     detectable: bool,
     hidden: Vec<Hidden>,
+    #[serde(default)]
+    noise_free: Vec<NoiseFree>,
 }
 
 #[derive(Deserialize)]
@@ -65,10 +71,12 @@ struct Line {
     passes: usize,
     gap_chi2: f64,
     shapes: f64,
-    /// Names, log evidence, chi2 left, pull, share.
-    fits: Vec<(String, f64, f64, f64, f64)>,
+    /// Names, log evidence, chi2 left, pull, share, chi2 that the law alone leaves.
+    fits: Vec<(String, f64, f64, f64, f64, f64)>,
     /// Verdict, names and probabilities with each changed constant of the decision.
     changed: Vec<Changed>,
+    /// Of a cause or pair with `noise_free`.
+    oracle: Option<Oracle>,
 }
 
 type Changed = (String, Vec<String>, Vec<(Vec<String>, f64)>, Vec<String>);
@@ -108,6 +116,10 @@ fn score(folder: &Path, options: &Options, changes: &[Constants]) -> Result<Line
             with(&mut result, constants)
         })
         .collect();
+    let mut causes = truth.cause.clone();
+    causes.sort_unstable();
+    let asked = truth.detectable && !truth.noise_free.is_empty() && causes != ["outside the library"];
+    let oracle = if asked { oracle(&passes, &truth.noise_free, &rig, &causes, options) } else { None };
     let (report, fitted) = (&result.report, &result.fitted);
     let wanted: BTreeMap<u64, &Hidden> = truth.hidden.iter().map(|h| (h.point, h)).collect();
     let (mut before, mut after) = (0.0, 0.0);
@@ -181,10 +193,12 @@ fn score(folder: &Path, options: &Options, changes: &[Constants]) -> Result<Line
                     fitted.problem.misfit(&b.mechanism),
                     b.pull(),
                     b.freedom.share + 10.0 * b.freedom.bend,
+                    fitted.problem.misfit(&b.by_law().mechanism),
                 )
             })
             .collect(),
         changed,
+        oracle,
     })
 }
 
@@ -235,6 +249,29 @@ fn median(mut list: Vec<f64>) -> f64 {
     if list.is_empty() { f64::NAN } else { 0.5 * (list[(list.len() - 1) / 2] + list[list.len() / 2]) }
 }
 
+/// Named right among those that noise-free forces can decide, by their distance from the library.
+fn by_oracle(what: &str, list: &[&Judged<'_>], right: &dyn Fn(&Judged<'_>) -> bool) -> String {
+    let known: Vec<(&Oracle, bool)> =
+        list.iter().filter_map(|j| Some((j.line.oracle.as_ref()?, right(j)))).collect();
+    if known.is_empty() {
+        return String::new();
+    }
+    let count = |f: &dyn Fn(&Oracle) -> bool| {
+        let own = known.iter().filter(|(o, _)| f(o));
+        format!("{} of {}", own.clone().filter(|(_, right)| *right).count(), own.count())
+    };
+    format!(
+        "{what}, decidable: named right {} ({} within 0.15 of the library, {} beyond); undecidable {}; distances \
+         beyond 0.15 in {} of {}\n",
+        count(&|o| o.decidable()),
+        count(&|o| o.decidable() && o.distance <= 0.15),
+        count(&|o| o.decidable() && o.distance > 0.15),
+        count(&|o| !o.decidable()),
+        known.iter().filter(|(o, _)| o.distance > 0.15).count(),
+        known.len()
+    )
+}
+
 fn summary(lines: &[Line]) -> String {
     let all: Vec<Judged<'_>> = lines.iter().map(judge).collect();
     let of = |kind: &str| all.iter().filter(|j| j.kind == kind).collect::<Vec<_>>();
@@ -263,6 +300,8 @@ fn summary(lines: &[Line]) -> String {
         count(&single, &named_wrong),
         log(&single)
     );
+    text += &by_oracle("singles", &single, &|j| named_right(j));
+    text += &by_oracle("pairs", &pair, &|j| named_right(j));
     text += &format!("faint: named wrong {}, log score {:.2}\n", count(&faint, &named_wrong), log(&faint));
     text += &format!(
         "pairs: both named {}, both lead {}, in class {}, named wrong {}, log score {:.2}\n",

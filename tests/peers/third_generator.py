@@ -1,7 +1,7 @@
 #!/usr/bin/env python3
 """Labelled tables of a finger on a vibrating plate, for `muprime diagnose`: the third generator (numpy, SciPy).
 
-usage: third_generator.py OUT --seed S [--singles 110] [--pairs 30] [--none 20] [--strangers 40] [--without-distances]
+usage: third_generator.py OUT --seed S [--singles 110] [--pairs 30] [--none 20] [--strangers 40]
 
 It shares no code with muprime, and no cause has a form of the library or of the project's own sealed sets. Each set is a
 folder: train.csv, rig.toml, conditions.csv (hidden passes without lateral force) and truth.json, which only a scorer
@@ -10,7 +10,7 @@ reads. Its keys:
   detectable: the noise-free gap over a recalibrated baseline has a chi2 of 30 in train.csv, and its rms on the hidden
     passes exceeds the floor, which is the stated repeatability there
   gap, floor, alone: that rms, the floor, and the chi2 of each member of a pair by itself
-  distance: what the library's nearest law of the cause's name leaves of the noise-free gap (third_library.py)
+  noise_free: lateral and normal force of each pass of train.csv as they would be read without noise
   hidden: noise-free lateral force, full friction and the recalibrated baseline's error of each hidden pass
 
 The contact is marched over the cycle: the plate presses the finger's spring, sliding stretches a lateral spring, and
@@ -650,7 +650,7 @@ def chosen(rng, stratum, index):
     return []
 
 
-def make(folder, stratum, index, seed, measured=True):
+def make(folder, stratum, index, seed):
     """One set: everything follows from the seed, the stratum and the index."""
     rng = np.random.default_rng([seed, STRATA.index(stratum), index])
     forms = chosen(rng, stratum, index)
@@ -663,10 +663,6 @@ def make(folder, stratum, index, seed, measured=True):
     rig["kn_true"], rig["kl_true"] = (rig[k] * np.exp(rig["sd"] * rng.standard_normal()) for k in ("kn", "kl"))
     values = [with_size(rng, f, d, rig) for f in forms]
     lateral, normal, chi2, gap, floor, left = gap_of(d, both(forms, values), (), rig)
-    distances = []
-    if measured and stratum in ("single", "pair"):
-        from third_library import distance  # the library's laws, which nothing else here reads
-        distances = [distance(f, v, d, rig) for f, v in zip(forms, values)]
     load = normal + rig["q"] * rng.standard_normal(len(normal))
     noisy = lateral * (1 + rig["r"] * scatter(rng, kind, d)) + rig["q"] * rng.standard_normal(len(normal))
     write(folder, d, rig, load, noisy)
@@ -682,9 +678,11 @@ def make(folder, stratum, index, seed, measured=True):
         "alone": [round(float(gap_of(d, f.act, v, rig)[2]), 1) for f, v in zip(forms, values)], "form": [f.form
                                                             for f in forms], "values": [[float(x) for x in v]
                                                             for v in values],
-        "distance": [round(x, 4) for x in distances], "noise": kind, "design": d.kind, "passes": int((~d.hidden).sum()),
+        "noise": kind, "design": d.kind, "passes": int((~d.hidden).sum()),
         "stranger": {"structure": forms[0].structure,
-                     "covariate": forms[0].covariate} if stratum == "stranger" else None, "hidden": hidden}
+                     "covariate": forms[0].covariate} if stratum == "stranger" else None, "hidden": hidden,
+        "noise_free": [{"point": int(i), "lateral_force_n": round(float(lateral[i]), 8),
+                        "normal_force_n": round(float(normal[i]), 8)} for i in np.flatnonzero(~d.hidden)]}
     (folder / "truth.json").write_text(json.dumps(truth))
     return truth
 
@@ -722,13 +720,12 @@ def main():
     parser.add_argument("--seed", type=int, required=True)
     for name, count in (("singles", 110), ("pairs", 30), ("none", 20), ("strangers", 40)):
         parser.add_argument(f"--{name}", type=int, default=count)
-    parser.add_argument("--without-distances", action="store_true", help="leave them out: they take most of the time")
     a = parser.parse_args()
     sets = [(s, i) for s, count in zip(STRATA, (a.singles, a.pairs, a.none, a.strangers)) for i in range(count)]
     for number in mixed(len(sets)):
-        truth = make(a.out / f"set-{number:03}", *sets[number], a.seed, not a.without_distances)
+        truth = make(a.out / f"set-{number:03}", *sets[number], a.seed)
         print(f"set-{number:03}", *(truth[k] for k in ("cause", "form", "noise", "design", "passes", "detectable",
-                                                       "chi2_over_recalibrated", "gap", "floor", "distance")), flush=True)
+                                                       "chi2_over_recalibrated", "gap", "floor")), flush=True)
 
 
 if __name__ == "__main__":

@@ -1,7 +1,7 @@
 #!/usr/bin/env python3
-"""Scores `muprime diagnose` on sets of third_generator.py.
+"""Scores `muprime diagnose` on sets of third_generator.py and fourth_generator.py.
 
-usage: third_score.py SETS [--program muprime] [--threads 2] [--until HH:MM]
+usage: score_sets.py SETS [--program muprime] [--threads 2] [--until HH:MM]
 
 Each set is diagnosed once; verdict.json beside it keeps the answer, so a second call continues after the first.
 It prints shares with Wilson's 95 % intervals, and times in processor seconds.
@@ -17,7 +17,7 @@ import time
 
 import numpy as np
 
-FAR, SURE = 0.15, 0.99
+SURE = 0.99
 
 
 def diagnosed(folder, program, threads):
@@ -41,8 +41,7 @@ def diagnosed(folder, program, threads):
 def judged(folder, verdict):
     """What the figures need of one set."""
     truth = json.loads((folder / "truth.json").read_text())
-    s = {**{k: truth[k] for k in ("stratum", "cause", "form", "noise", "design", "detectable", "distance", "alone",
-                                  "passes")},
+    s = {**{k: truth[k] for k in ("stratum", "cause", "form", "noise", "design", "detectable", "alone", "passes")},
          "set": folder.name, "verdict": verdict["verdict"], "seconds": verdict["seconds"]}
     first = verdict["hypotheses"][0]
     s["top"], s["class"] = sorted(first["effects"]), first["alias_class"]
@@ -99,16 +98,9 @@ def figures(sets):
     of = lambda stratum: [s for s in sets if s["stratum"] == stratum]
     singles, pairs, none, strangers = (of(x) for x in ("single", "pair", "none", "stranger"))
     seen = [s for s in singles if s["detectable"]]
-    near, far = [s for s in seen if s["distance"] and s["distance"][0] <= FAR], [s for s in seen if s["distance"]
-                                                            and s["distance"][0] > FAR]
-    measured = [s["distance"][0] for s in singles if s["distance"]]
-    if measured:
-        say("distance of singles: quartiles; beyond 0.15",
-            f"{np.quantile(measured, (.25, .5, .75)).round(2)}; {np.mean(np.array(measured) > FAR):.2f} of {len(measured)}")
-    for words, part in (("detectable singles", seen), ("  within 0.15", near), ("  beyond 0.15", far)):
-        say(f"{words}: named right", share(part, lambda s: s["right"]))
-        say(f"{words}: in the stated class", share(part, lambda s: s["in_class"]))
-        say(f"{words}: named wrong", share(part, lambda s: s["wrong"]))
+    say("detectable singles: named right", share(seen, lambda s: s["right"]))
+    say("detectable singles: in the stated class", share(seen, lambda s: s["in_class"]))
+    say("detectable singles: named wrong", share(seen, lambda s: s["wrong"]))
     say("all singles: named wrong", share(singles, lambda s: s["wrong"]))
     say("none: named or a gap claimed", share(none, lambda s: s["verdict"] != "no_gap"))
     say("none: named", share(none, lambda s: s["verdict"] == "named"))
@@ -161,14 +153,13 @@ def figures(sets):
             say(f"{key} {value}: named right; wrong; gap claimed of none",
                 f"{share(part, lambda s: s['right'])}; {sum(s['wrong'] for s in every)} of {len(every)}; "
                 f"{sum(s['verdict'] != 'no_gap' for s in still)} of {len(still)}")
-    print("cause: detectable, right, in class, unknown, wrong; distances")
+    print("cause: detectable, right, in class, unknown, wrong; seconds")
     for name in sorted({s["cause"][0] for s in singles}):
         part = [s for s in seen if s["cause"] == [name]]
         counts = [len(part)] + [sum(bool(s[k]) for s in part) for k in ("right",
                                                             "in_class")] + [sum(s["verdict"] == "unknown"
                                                             for s in part), sum(s["wrong"] for s in part)]
-        print(f"  {name:28}", counts, [d for s in part for d in s["distance"]],
-              round(np.median([s["seconds"] for s in part]), 1) if part else "")
+        print(f"  {name:28}", counts, round(np.median([s["seconds"] for s in part]), 1) if part else "")
 
 
 def main():
@@ -188,8 +179,7 @@ def main():
             sets.append(judged(folder, diagnosed(folder, a.program, a.threads)))
             if a.lines:
                 s = sets[-1]
-                print(s["set"], s["stratum"], *s["cause"], s["form"], s["noise"], s["detectable"], s["distance"],
-                      "->", s["verdict"], s["top"],
+                print(s["set"], s["stratum"], *s["cause"], s["form"], s["noise"], s["detectable"], "->", s["verdict"], s["top"],
                       round(s["stated"][0][1], 3), s["description"][:2], f"{s['seconds']:.1f} s", flush=True)
     print(f"{len(sets)} of {len(folders)} sets are scored")
     figures(sets)
