@@ -70,6 +70,7 @@ pub fn decide(fitted: &mut Fitted) -> Decision {
     let claimed = none < fitted.problem.constants.claim_probability;
     let (regions, judged, survival) = judged(fitted, leader, claimed);
     let fitted = &*fitted;
+    let survival = survival * by_its_law(fitted, leader);
     let (k, candidates) = (&*fitted.problem.constants, &fitted.candidates);
     if claimed {
         // An effect that cannot predict what it has not seen is no cause: its weight goes to the open set.
@@ -138,6 +139,15 @@ fn judged(fitted: &mut Fitted, leader: usize, claimed: bool) -> (Vec<Region>, Ga
         all.reduce(|a, b| if b.0 > a.0 { b } else { a }).expect("a candidate has a law");
     fitted.candidates[leader].best = law;
     (regions, gate, survival)
+}
+
+/// The share of its probability that a bent leader keeps: the name is that of a law, and a function that may be any
+/// fits what no law of the cause makes. All where the law takes up enough of the gap alone.
+fn by_its_law(fitted: &Fitted, leader: usize) -> f64 {
+    let (best, gap) = (&fitted.candidates[leader].best, left(fitted, &fitted.none));
+    let Some(law) = best.plain.as_deref().filter(|_| gap > 0.0) else { return 1.0 };
+    let taken = 1.0 - left(fitted, law) / gap;
+    (taken / fitted.problem.constants.bent_law_takes).clamp(0.0, 1.0)
 }
 
 /// The leader and every hypothesis of its size that the data does not tell from it.

@@ -31,17 +31,30 @@ fn what_a_bent_law_takes_up_is_sought_as_a_second_cause() {
     named(&["amplitude_miscalibration+mode_shape"]);
 }
 
+/// Friction that jumps at a speed (tests/peers/fourth_generator.py, `--seed 41112802`, set 196): a function of the speed
+/// bends to it, and rate dependence was named. The law alone takes up a third of the gap.
+#[test]
+fn a_jump_is_no_cause_whose_function_bends_to_it() {
+    let (verdict, text, _) = diagnosed("jump_over_speed");
+    assert_ne!(verdict, Verdict::Named, "{text}");
+}
+
 fn named(causes: &[&str]) {
     causes.par_iter().for_each(|cause| {
-        let folder = Path::new(env!("CARGO_MANIFEST_DIR")).join("tests/forms").join(cause);
-        let text = |name: &str| std::fs::read_to_string(folder.join(name)).unwrap();
-        let passes = models::pass::read_passes(text("train.csv").as_bytes()).unwrap();
-        let table = Table::measured(&passes).unwrap();
-        let rig = RigFile::parse(&text("rig.toml")).unwrap();
-        let report = diagnose(&table, &rig, &Options::default(), String::new()).report;
-        assert_eq!(report.verdict, Verdict::Named, "{cause}: {}", report.text);
-        let mut effects = report.hypotheses[0].effects.clone();
+        let (verdict, text, mut effects) = diagnosed(cause);
+        assert_eq!(verdict, Verdict::Named, "{cause}: {text}");
         effects.sort_unstable();
-        assert_eq!(effects.join("+"), *cause, "{}", report.text);
+        assert_eq!(effects.join("+"), *cause, "{text}");
     });
+}
+
+/// Verdict, text and first hypothesis of a set.
+fn diagnosed(set: &str) -> (Verdict, String, Vec<String>) {
+    let folder = Path::new(env!("CARGO_MANIFEST_DIR")).join("tests/forms").join(set);
+    let text = |name: &str| std::fs::read_to_string(folder.join(name)).unwrap();
+    let passes = models::pass::read_passes(text("train.csv").as_bytes()).unwrap();
+    let table = Table::measured(&passes).unwrap();
+    let rig = RigFile::parse(&text("rig.toml")).unwrap();
+    let report = diagnose(&table, &rig, &Options::default(), String::new()).report;
+    (report.verdict, report.text.clone(), report.hypotheses[0].effects.clone())
 }
