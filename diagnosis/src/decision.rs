@@ -141,8 +141,8 @@ fn judged(fitted: &mut Fitted, leader: usize, claimed: bool) -> (Vec<Region>, Ga
     (regions, gate, survival)
 }
 
-/// The share of its probability that a bent leader keeps: the name is that of a law, and a function that may be any
-/// fits what no law of the cause makes. All where the law takes up enough of the gap alone.
+/// The share of its probability that a bent leader keeps: the name is that of a law, and a function that may
+/// be any fits what no law of the cause makes. All where the law takes up enough of the gap alone.
 fn by_its_law(fitted: &Fitted, leader: usize) -> f64 {
     let (best, gap) = (&fitted.candidates[leader].best, left(fitted, &fitted.none));
     let Some(law) = best.plain.as_deref().filter(|_| gap > 0.0) else { return 1.0 };

@@ -230,9 +230,9 @@ fn sought_again(problem: &Problem, singles: &mut [Candidate], pairs: &[Candidate
     }
 }
 
-/// Pairs, where the best single leaves something by its law: one that leaves nothing needs no second cause, unless it
-/// is the stiffnesses that took it up, or the open set is ahead of it: what it leaves may be less than runs shift by.
-/// What a function that may be any took up beside the law may be a second cause.
+/// Pairs, where the best single leaves something by its law: one that leaves nothing needs no second cause,
+/// unless it is the stiffnesses that took it up, or the open set is ahead of it: what it leaves may be less
+/// than runs shift by. What a function that may be any took up beside the law may be a second cause.
 fn second_causes(
     problem: &Problem,
     singles: &[Candidate],

@@ -1,5 +1,5 @@
-//! Causes in a formula that the library does not have, by tests/peers/third_generator.py (`--seed 36113007` unless said), which
-//! marches a spring-slider over the cycle and shares no code with this project.
+//! Causes in a formula that the library does not have, by tests/peers/third_generator.py (`--seed 36113007`
+//! unless said), which marches a spring-slider over the cycle and shares no code with this project.
 
 use models::rig_file::RigFile;
 use muprime_diagnosis::data::Table;
@@ -23,16 +23,16 @@ fn a_cause_in_another_formula_is_named() {
     named(&["normal_damping", "lateral_recovery", "rate_dependent_friction"]);
 }
 
-/// A plate of rings with a pick-up that has a floor (`--seed 36113231`, set 122): one law of rings with a function beside
-/// it leaves no more than scatter does, and was named alone. By its law it leaves 17 deviations, and two causes are
-/// 44 nats ahead.
+/// A plate of rings with a pick-up that has a floor (`--seed 36113231`, set 122): one law of rings with a
+/// function beside it leaves no more than scatter does, and was named alone. By its law it leaves 17
+/// deviations, and two causes are 44 nats ahead.
 #[test]
 fn what_a_bent_law_takes_up_is_sought_as_a_second_cause() {
     named(&["amplitude_miscalibration+mode_shape"]);
 }
 
-/// Friction that jumps at a speed (tests/peers/fourth_generator.py, `--seed 41112802`, set 196): a function of the speed
-/// bends to it, and rate dependence was named. The law alone takes up a third of the gap.
+/// Friction that jumps at a speed (tests/peers/fourth_generator.py, `--seed 41112802`, set 196): a function of
+/// the speed bends to it, and rate dependence was named. The law alone takes up a third of the gap.
 #[test]
 fn a_jump_is_no_cause_whose_function_bends_to_it() {
     let (verdict, text, _) = diagnosed("jump_over_speed");

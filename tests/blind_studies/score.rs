@@ -4,8 +4,8 @@
 //! Every folder in `FOLDER` holds `train.csv`, `rig.toml`, `conditions.csv` and `truth.json`: `cause`
 //! (names; none for no gap; `outside the library`), `detectable`, and `hidden` (noise-free force and full
 //! friction by point). `noise_free` (forces of the training passes by point), where it is there, says how far
-//! the cause is from the library, and whether another imitates it (`decidable.rs`). One line a set goes to `LINES.json`, with everything that was fitted; what is
-//! printed is their summary.
+//! the cause is from the library, and whether another imitates it (`decidable.rs`). One line a set goes to
+//! `LINES.json`, with everything that was fitted; what is printed is their summary.
 #![allow(clippy::disallowed_methods, reason = "it says how long each set took")]
 #![allow(missing_docs, reason = "a study, not a library")]
 
