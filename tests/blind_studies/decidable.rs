@@ -42,7 +42,8 @@ pub struct Imitator {
 /// What noise-free forces say.
 #[derive(Serialize)]
 pub struct Oracle {
-    /// Root of the share of the gap's chi2 that the nearest law of the cause's name leaves.
+    /// Root of the share of the gap's chi2 that the nearest law of the cause's name leaves, the pull of the
+    /// nuisances counted.
     pub distance: f64,
     /// The nearest that lack one of the causes, nearest first.
     pub imitators: Vec<Imitator>,

@@ -350,7 +350,7 @@ FORM_TABLE = [
      "both stiffnesses creep with a quick and a slow time; the lateral one by another power",
      lambda m, s, t1, t2, b: stiffen(m, c := s * (1 - 0.4 * np.exp(-m.t / t1) - 0.6 * np.exp(-m.t / t2)), b * c)),
     ("stiffness", "subsurface_relaxation", "log_creep", 0.02, 1.2, 1, [(2, 30)], "time runs",
-     "logarithmic creep that starts anew after each pause",
+     "logarithmic creep that starts again after each pause",
      lambda m, s, t0: stiffen(m, c := s * np.log1p(m.rt / t0) / np.log1p(300 / t0), c)),
     ("stiffness", "subsurface_relaxation", "load_dose", 0.02, 1.5, 1, [(0.15, 0.6)], "time",
      "stiffness changes with the sum of load times time so far, saturating",

@@ -179,8 +179,8 @@ def main():
             sets.append(judged(folder, diagnosed(folder, a.program, a.threads)))
             if a.lines:
                 s = sets[-1]
-                print(s["set"], s["stratum"], *s["cause"], s["form"], s["noise"], s["detectable"], "->", s["verdict"], s["top"],
-                      round(s["stated"][0][1], 3), s["description"][:2], f"{s['seconds']:.1f} s", flush=True)
+                print(s["set"], s["stratum"], *s["cause"], s["form"], s["noise"], s["detectable"], "->",
+                      s["verdict"], s["top"], round(s["stated"][0][1], 3), s["description"][:2], f"{s['seconds']:.1f} s", flush=True)
     print(f"{len(sets)} of {len(folders)} sets are scored")
     figures(sets)
 
