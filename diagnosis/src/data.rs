@@ -62,6 +62,8 @@ const LEAST_MU0: f64 = 0.05;
 const SAME_FREQUENCY: f64 = 1e-3;
 /// Range of temperatures below which a table shows nothing of them, K.
 const SAME_TEMPERATURE_K: f64 = 0.3;
+/// Range of relative humidity below which it counts as one, percent.
+const SAME_HUMIDITY_PCT: f64 = 3.0;
 
 /// Passes in the order of measurement, with the groups that are held out together.
 #[derive(Debug, Clone)]
@@ -244,6 +246,13 @@ impl Table {
                 p.iter().filter(moves).fold((f64::INFINITY, 0.0f64), |(a, b), q| (a.min(f(q)), b.max(f(q))));
             if low > 0.0 { high / low } else { f64::INFINITY }
         };
+        // Known at every pass, and over more than this range.
+        let changes = |f: &dyn Fn(&Condition) -> Option<f64>, same: f64| {
+            let known: Vec<f64> = p.iter().filter_map(f).collect();
+            let (low, high) =
+                known.iter().fold((f64::INFINITY, f64::NEG_INFINITY), |(a, b), v| (a.min(*v), b.max(*v)));
+            known.len() == p.len() && high - low > same
+        };
         needs.iter().find_map(|need| {
             let missing = match need {
                 Need::Vibration => !p.iter().any(|q| q.amplitude > PeakToPeak::ZERO),
@@ -257,13 +266,8 @@ impl Table {
                     !p.iter().any(|q| (q.frequency_hz / p[0].frequency_hz - 1.0).abs() > SAME_FREQUENCY)
                 }
                 Need::Runs => self.run_count < 2,
-                Need::Temperatures => {
-                    let known: Vec<f64> = p.iter().filter_map(|q| q.temperature_c).collect();
-                    let (low, high) = known
-                        .iter()
-                        .fold((f64::INFINITY, f64::NEG_INFINITY), |(a, b), t| (a.min(*t), b.max(*t)));
-                    known.len() < p.len() || high - low <= SAME_TEMPERATURE_K
-                }
+                Need::Temperatures => !changes(&|q| q.temperature_c, SAME_TEMPERATURE_K),
+                Need::Humidities => !changes(&|q| q.relative_humidity_pct, SAME_HUMIDITY_PCT),
                 Need::Record | Need::OutsideStandard | Need::NormalStandard => true,
             };
             missing.then(|| need.missing().to_string())

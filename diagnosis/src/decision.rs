@@ -106,13 +106,20 @@ pub fn decide(fitted: &mut Fitted) -> Decision {
 }
 
 /// Probabilities with the chance that the method errs and does not see it: none is then surer than verdicts
-/// on labelled sets have been right, and none is 1e-40.
+/// on labelled sets have been right, and none is 1e-40. What no hypothesis explains may be a cause of the
+/// library all the same, in a form that neither its laws nor a function beside them reach: a share of the
+/// open set goes to the causes.
 fn doubted(fitted: &Fitted, none: f64, unknown: f64, probabilities: &mut [f64]) -> (f64, f64) {
-    let doubt = fitted.problem.constants.doubt;
+    let k = &fitted.problem.constants;
     let (no_gap, open, each) = fitted.coarse();
-    let mixed = |p: f64, coarse: f64| (1.0 - doubt) * p + doubt * coarse;
-    probabilities.iter_mut().zip(each).for_each(|(p, coarse)| *p = mixed(*p, coarse));
-    (mixed(none, no_gap), mixed(unknown, open))
+    let mixed = |p: f64, coarse: f64| (1.0 - k.doubt) * p + k.doubt * coarse;
+    let (none, unknown) = (mixed(none, no_gap), mixed(unknown, open));
+    let causes = each.iter().sum::<f64>().max(f64::MIN_POSITIVE);
+    let foreign = if probabilities.is_empty() { 0.0 } else { k.foreign_form * unknown };
+    for (p, coarse) in probabilities.iter_mut().zip(each) {
+        *p = mixed(*p, coarse) + foreign * coarse / causes;
+    }
+    (none, unknown - foreign)
 }
 
 /// The leader on the left-out regions. Of its laws that the evidence does not tell apart the one that

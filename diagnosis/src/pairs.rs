@@ -154,14 +154,15 @@ fn refined(problem: &Problem, start: Start, loose: &[f64], basis: &Basis) -> Opt
     Some(laplace(problem, members, &fit.u, basis, freedom, ROUNDS[0]))
 }
 
-/// The same pair with the exact alias of one of its members in its place.
-fn twins(problem: &Problem, pair: &Posterior) -> Vec<(Vec<Member>, Vec<f64>)> {
+/// The same pair with the exact alias of one of its members in its place, if that one is tried.
+fn twins(problem: &Problem, singles: &[Candidate], pair: &Posterior) -> Vec<(Vec<Member>, Vec<f64>)> {
     let member = |(effect, law): (usize, usize)| Member { effect, law };
     let both = effects::twins().into_iter().flat_map(|[a, b]| [(a, b), (b, a)]);
     let both = both.map(|(one, other)| (member(one), member(other)));
     both.filter_map(|(one, other)| {
         let place = pair.members.iter().position(|m| *m == one)?;
-        if pair.members.iter().any(|m| m.effect == other.effect) {
+        let tried = singles.iter().any(|c| c.effects == [other.effect]);
+        if !tried || pair.members.iter().any(|m| m.effect == other.effect) {
             return None;
         }
         let (mut members, mut u) = (pair.members.clone(), pair.u.clone());
@@ -228,7 +229,7 @@ pub fn pairs(problem: &Problem, singles: &[Candidate], loose: &[f64], basis: &Ba
     let mut found = with_every_law(problem, first, singles, loose, basis);
     let twins: Vec<Pair> = found
         .par_iter()
-        .flat_map_iter(|pair| twins(problem, &pair.posterior))
+        .flat_map_iter(|pair| twins(problem, singles, &pair.posterior))
         .map(|(members, u)| {
             let freedom = middle_freedom(k, &members);
             Pair::of(laplace(problem, &members, &u, basis, freedom, ROUNDS[1]))

@@ -5,7 +5,7 @@ use models::rig_file::RigFile;
 use muprime_diagnosis::data::Table;
 use muprime_diagnosis::decision::Verdict;
 use muprime_diagnosis::hypotheses::Options;
-use muprime_diagnosis::verdict::diagnose;
+use muprime_diagnosis::verdict::{Report, diagnose};
 use rayon::prelude::*;
 use std::path::Path;
 
@@ -21,6 +21,14 @@ fn evidence_far_ahead_of_any_other_description_makes_up_for_a_foreign_form() {
 #[test]
 fn a_cause_in_another_formula_is_named() {
     named(&["normal_damping", "lateral_recovery", "rate_dependent_friction"]);
+}
+
+/// Ridges whose mass lies within soft skin, menisci above a humidity (tests/peers/fourth_generator.py,
+/// `--seed 41112903`, sets 87 and 29) and a cable that pulls the stage one way (fifth_generator.py, `--seed
+/// 51112801`, set 67): `unknown`, but for the menisci, which were a pair, before the laws knew these.
+#[test]
+fn a_cause_of_data_sheets_is_named() {
+    named(&["ridge_inertia", "adhesion", "speed_error"]);
 }
 
 /// A plate of rings with a pick-up that has a floor (`--seed 36113231`, set 122): one law of rings with a
@@ -39,6 +47,17 @@ fn a_jump_is_no_cause_whose_function_bends_to_it() {
     assert_ne!(verdict, Verdict::Named, "{text}");
 }
 
+/// A cause that is left out of the library does not come back in the place of its exact alias in a pair.
+#[test]
+fn what_is_left_out_is_no_member_of_a_pair() {
+    let without = || Options { without: vec!["stiffness_error".into()], ..Options::default() };
+    for (options, tried) in [(Options::default(), true), (without(), false)] {
+        let report = report("amplitude_miscalibration+mode_shape", &options);
+        let among = report.hypotheses.iter().any(|h| h.effects.iter().any(|e| e == "stiffness_error"));
+        assert_eq!(among, tried, "{}", report.text);
+    }
+}
+
 fn named(causes: &[&str]) {
     causes.par_iter().for_each(|cause| {
         let (verdict, text, mut effects) = diagnosed(cause);
@@ -50,11 +69,15 @@ fn named(causes: &[&str]) {
 
 /// Verdict, text and first hypothesis of a set.
 fn diagnosed(set: &str) -> (Verdict, String, Vec<String>) {
+    let report = report(set, &Options::default());
+    (report.verdict, report.text.clone(), report.hypotheses[0].effects.clone())
+}
+
+fn report(set: &str, options: &Options) -> Report {
     let folder = Path::new(env!("CARGO_MANIFEST_DIR")).join("tests/forms").join(set);
     let text = |name: &str| std::fs::read_to_string(folder.join(name)).unwrap();
     let passes = models::pass::read_passes(text("train.csv").as_bytes()).unwrap();
     let table = Table::measured(&passes).unwrap();
     let rig = RigFile::parse(&text("rig.toml")).unwrap();
-    let report = diagnose(&table, &rig, &Options::default(), String::new()).report;
-    (report.verdict, report.text.clone(), report.hypotheses[0].effects.clone())
+    diagnose(&table, &rig, options, String::new()).report
 }

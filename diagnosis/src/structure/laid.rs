@@ -75,6 +75,8 @@ mod tests {
         let (fitted, held): (Vec<usize>, Vec<usize>) = (0..whole.len()).partition(|i| i % 3 != 1);
         let result = diagnose(&whole.select(&fitted), &rig(), &Options::default(), String::new());
         assert_eq!(result.report.verdict, Verdict::Unknown, "{}", result.report.text);
+        // A cause in a form that nobody has fitted would look alike: causes keep a share.
+        assert!((0.5..0.9).contains(&result.report.hypotheses[0].probability), "{}", result.report.text);
         assert_eq!(result.report.description[0].covariate, "time_s");
         assert!(result.report.text.contains("with the first shape described"), "{}", result.report.text);
         let held = whole.select(&held);

@@ -9,11 +9,13 @@
 
 pub mod asperities;
 pub(crate) mod gap;
+mod held;
 pub mod impact;
 mod retarded;
 mod stick;
 pub mod sweep;
 
+pub use held::Held;
 use models::root::{bisection, newton_or_half};
 use std::f64::consts::PI;
 
@@ -60,16 +62,25 @@ pub struct Contact {
     /// the skin along, in slip against viscosity (Perzyna); else it follows the limit down no faster than the
     /// recovery allows, and does not grow. In flight it recovers in either case.
     pub viscous_slip: bool,
+    /// Stretch that the tissue holds from contact to contact. Nothing in the baseline.
+    pub held: Held,
     /// Time in which bonds form after touch-down, s. 0 in the baseline.
     pub bonding_time: f64,
     /// Exponent of the growth of bonds: 1 first order, 0.5 stretched.
     pub bonding_exponent: f64,
+    /// Share of the limit that waits for bonds.
+    pub bonding_share: f64,
+    /// Whether bonds form by the normal force of the instant over its mean, rather than by time alone.
+    pub bonding_by_pressure: bool,
     /// Scale of the heights of the asperities, m. 0 in the baseline (one height).
     pub asperity_height: f64,
     /// Distribution of the heights.
     pub asperity_heights: asperities::Heights,
     /// Retardation time of the normal spring, s. 0 in the baseline.
     pub normal_retardation_time: f64,
+    /// Damping in proportion to the indentation (Hunt and Crossley), s/m: the normal force rises by this
+    /// times the speed of indentation, and no more than twofold. 0 in the baseline.
+    pub indentation_damping: f64,
     /// Mass of the ridges that follow the plate, kg. 0 in the baseline.
     pub mass: f64,
     /// Damping ratio of the ridges where there is mass.
@@ -136,6 +147,8 @@ impl Contact {
             || self.bonding_time > 0.0
             || self.attraction != Attraction::None
             || self.normal_retardation_time > 0.0
+            || self.indentation_damping > 0.0
+            || self.held.share > 0.0
     }
 }
 

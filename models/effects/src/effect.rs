@@ -281,6 +281,8 @@ pub enum Need {
     Runs,
     /// A temperature at every pass, and one that changes.
     Temperatures,
+    /// A relative humidity at every pass, and one that changes.
+    Humidities,
     /// Signals within a pass: a run's record.
     Record,
     /// A calibration of the lateral axis against an outside standard (dead weight).
@@ -299,6 +301,7 @@ impl Need {
     pub fn covariate(self) -> Option<&'static Covariate> {
         match self {
             Need::Temperatures => Some(&covariate::TEMPERATURE),
+            Need::Humidities => Some(&covariate::RELATIVE_HUMIDITY),
             _ => None,
         }
     }
@@ -327,6 +330,7 @@ impl Need {
             Need::Frequencies => "all passes have one frequency: a second one is missing",
             Need::Runs => "all passes are of one run: a second one is missing",
             Need::Temperatures => "temperature_c is missing, or does not change",
+            Need::Humidities => "relative_humidity_pct is missing, or does not change",
             Need::Record => "means over passes do not show it; a time-resolved run record is missing",
             Need::OutsideStandard => {
                 "it acts like a change of mu0 and lateral stiffness; calibrate the lateral axis with weights"

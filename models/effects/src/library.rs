@@ -15,6 +15,21 @@ mod prelude {
     pub use models::condition::Condition;
     pub use models::covariate;
     pub use models::rig_file::CertifiedKey;
+
+    /// What is left alone between runs recovers in part.
+    pub const IN_RUN: Parameter = Parameter::positive("share_of_time_in_run", "1", 0.4, 1.0).bending();
+    /// Growth of a lever arm, or of a bowed plate's angle, along the plate.
+    pub const ALONG: Parameter = Parameter::signed("growth_over_stroke", "1", 0.7, -3.0, 3.0).bending();
+    /// Growth as a sensor or a mount yields under the load.
+    pub const LOADED: Parameter = Parameter::signed("growth_with_load", "1", 0.3, -0.9, 2.0).bending();
+
+    /// A size alone, or one that changes by [`ALONG`] and [`LOADED`].
+    pub fn bent(theta: &[f64], pass: &Condition, design: &Design) -> f64 {
+        let [size, along, loaded] = *theta else { return theta[0] };
+        let place = if design.stroke_m > 0.0 { pass.position_m / design.stroke_m } else { 0.0 };
+        let load = pass.normal_force_n / design.reference_load_n - 1.0;
+        size * (1.0 + along * place) * (1.0 + loaded * load)
+    }
 }
 
 /// Declares the files of this folder and lists their causes.

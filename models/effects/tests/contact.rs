@@ -3,7 +3,7 @@ use models::condition::Condition;
 use models::quantity::PeakToPeak;
 use muprime_effects::contact::asperities::Heights;
 use muprime_effects::contact::impact::{Bouncing, LANDINGS, STATED_ERROR};
-use muprime_effects::contact::{Attraction, Contact, half_contact_angle, mean_friction};
+use muprime_effects::contact::{Attraction, Contact, Held, half_contact_angle, mean_friction};
 use muprime_effects::{Baseline, Design};
 use std::f64::consts::PI;
 
@@ -116,21 +116,27 @@ fn inertia_table_errs_as_stated() {
 }
 
 /// In a contact that never ends the equations are linear: the force swings by the modulus of the dynamic
-/// stiffness, and the slider is the massless one of that swing. Skin of one part in sixty gives way a little.
+/// stiffness of ridge and surface in series, and the slider is the massless one of that swing.
 #[test]
 fn an_unbroken_contact_with_mass_is_linear() {
-    for (ratio, damping) in [(0.3, 0.2), (0.6, 0.5), (0.9, 1.0)] {
-        let swing = f64::hypot(1.0 - ratio * ratio, 2.0 * damping * ratio);
-        let load = 1.6 * swing;
-        let marched = Bouncing { load, ratio, damping, landing: 0.2 }.friction(&[0.05 * swing])[0] / load;
-        let base = contact(2e-6, 0.02, 0.25, 1e6, 0.4e6);
-        let massless = Contact {
-            normal_force: 1.6 * base.normal_stiffness * base.half_amplitude(),
-            speed: base.speed * 0.05 / base.drag(),
-            ..base
-        };
-        let expected = relative(&massless);
-        assert!((marched / expected - 1.0).abs() < 0.03, "{ratio} {damping}: {marched} for {expected}");
+    for landing in LANDINGS {
+        for (ratio, damping) in [(0.3, 0.2), (0.6, 0.5), (0.9, 1.0)] {
+            let inner = landing.stiffness / (landing.stiffness - 1.0);
+            let ridge = (inner - ratio * ratio, 2.0 * damping * ratio);
+            let skin = (landing.stiffness, 2.0 * landing.damping * landing.stiffness.sqrt() * ratio);
+            let in_series = (ridge.0 + skin.0).hypot(ridge.1 + skin.1);
+            let swing = ridge.0.hypot(ridge.1) * skin.0.hypot(skin.1) / in_series;
+            let load = 1.6 * swing;
+            let marched = Bouncing { load, ratio, damping, landing }.friction(&[0.05 * swing])[0] / load;
+            let base = contact(2e-6, 0.02, 0.25, 1e6, 0.4e6);
+            let massless = Contact {
+                normal_force: 1.6 * base.normal_stiffness * base.half_amplitude(),
+                speed: base.speed * 0.05 / base.drag(),
+                ..base
+            };
+            let expected = relative(&massless);
+            assert!((marched / expected - 1.0).abs() < 0.01, "{ratio} {damping}: {marched} for {expected}");
+        }
     }
 }
 
@@ -292,5 +298,52 @@ fn slip_against_viscosity_is_that_of_small_steps() {
         }
         println!("{swept} {sum}");
         assert!((swept / sum - 1.0).abs() < 2e-3, "{swept} {sum}");
+    }
+}
+
+/// Where the slider never sticks the mean friction is that of the limit, in closed form. Hunt and Crossley's
+/// damping turns with the speed of indentation, so over a contact its work on the load is nil. Bonds that
+/// form by pressing grow with the impulse: the mean of `1 - s exp(-D/tau)` over the impulse of a cycle, T, is
+/// `1 - s tau/T (1 - exp(-T/tau))`.
+#[test]
+fn a_limit_that_slips_all_the_time_has_the_mean_of_its_closed_form() {
+    for (amplitude, load) in [(1e-6, 0.1), (3e-6, 0.4), (0.6e-6, 0.25)] {
+        let c = contact(amplitude, 20.0, load, 2e6, 0.8e6);
+        for indentation_damping in [0.5, 6.0, 40.0] {
+            let mean = relative(&Contact { indentation_damping, ..c });
+            assert!((mean - 1.0).abs() < 2e-3, "{amplitude} {indentation_damping}: {mean}");
+        }
+        for (bonding_time, bonding_share) in [(4e-6, 1.0), (30e-6, 0.5), (300e-6, 0.9)] {
+            let bonds = Contact { bonding_time, bonding_share, bonding_by_pressure: true, ..c };
+            let times = 1.0 / (c.frequency * bonding_time);
+            let expected = 1.0 + bonding_share * (-times).exp_m1() / times;
+            let mean = relative(&bonds);
+            assert!(
+                (mean / expected - 1.0).abs() < 4e-3,
+                "{amplitude} {bonding_time}: {mean} for {expected}"
+            );
+        }
+    }
+}
+
+/// A slow slider sticks but for the edges of a contact: its stretch grows from what the tissue holds, `x0`,
+/// by the plate's way `Ut`. With the share `a` left of the largest stretch, `x0 = a Ut/(1 - a)`; of the mean
+/// one, which is `(Ut/2 + x0)` for the share `d` of the cycle, `x0 = a d Ut/2/(1 - a d)`.
+#[test]
+fn what_the_tissue_holds_is_the_sum_of_a_geometric_series() {
+    let c = contact(4e-6, 1e-5, 0.5, 2e6, 0.8e6);
+    let duty = half_contact_angle(c.load_ratio(), 0.0) / PI;
+    let way = c.speed * duty / c.frequency;
+    let flight = (1.0 - duty) / c.frequency;
+    for (share, time, spread) in [(0.5, 20e-6, 0.0), (0.9, 50e-6, 1.0), (1.2, 15e-6, 2.0f64)] {
+        let times = flight / time;
+        let left = if spread == 0.0 { (-times).exp() } else { (1.0 + spread * times).powf(-1.0 / spread) };
+        let a = share * left;
+        for (of_mean, x0) in [(0.0, a * way / (1.0 - a)), (1.0, 0.5 * a * duty * way / (1.0 - a * duty))] {
+            let held = Contact { held: Held { share, time, spread, of_mean, elastic: 0.0 }, ..c };
+            let expected = c.lateral_stiffness * duty * (0.5 * way + x0);
+            let mean = mean_friction(&held);
+            assert!((mean / expected - 1.0).abs() < 0.02, "{share} {of_mean}: {mean} for {expected}");
+        }
     }
 }

@@ -267,4 +267,23 @@ fn laws_change_what_they_state_by_their_formula() {
     });
     same(unbroken[0], unbroken[1]);
     assert!(parted[1] < 0.99 * parted[0], "{parted:?}");
+    // Half of the menisci are there at the onset, and all of them in wet air.
+    let humid = |percent| Condition { relative_humidity_pct: Some(percent), ..moving(1.0) };
+    let dmt = |newtons: f64| force(&BASELINE, "adhesion", "DMT", &[newtons, 0.0, 0.0], &moving(1.0));
+    for (percent, share) in [(50.0, 0.5), (500.0, 1.0)] {
+        same(force(&BASELINE, "adhesion", "menisci", &[0.1, 50.0, 4.0], &humid(percent)), dmt(0.1 * share));
+    }
+    // A lever arm as long as the stroke doubles a cross-talk at its end; at twice the reference load half as
+    // much comes on top.
+    let mean = DESIGN.reference_load_n;
+    let still = |position_m, normal_force_n| Condition { position_m, normal_force_n, ..moving(0.0) };
+    let read = |pass: &Condition| {
+        force(&BASELINE, "force_crosstalk", "normal into lateral", &[0.02, 1.0, 0.5], pass)
+            - lateral_force(&BASELINE, &[], pass, &DESIGN)
+    };
+    for (pass, crosstalk) in
+        [(still(0.0, mean), 0.02), (still(0.03, mean), 0.04), (still(0.0, 2.0 * mean), 0.03)]
+    {
+        same(read(&pass), crosstalk * pass.normal_force_n);
+    }
 }

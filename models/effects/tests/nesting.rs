@@ -21,7 +21,7 @@ fn passes() -> Vec<Condition> {
                         ambient_pressure_pa: Some(50_000.0),
                         temperature_c: Some(20.0 + i as f64),
                         mu0: 0.6,
-                        relative_humidity_pct: None,
+                        relative_humidity_pct: Some(30.0 + 10.0 * i as f64),
                     });
                 }
             }

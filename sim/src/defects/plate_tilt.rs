@@ -1,22 +1,23 @@
-//! The plate is tilted against the sensor, and bent: the tilt changes along the stroke.
+//! The plate is tilted against the sensor, and waved: the tilt changes along the stroke.
 
 use super::*;
 
 pub(super) const KIND: DefectKind = DefectKind {
     parameters: &[
         Parameter::signed("tilt_rad", 0.0015, 0.12),
-        Parameter::linear("bend_over_tilt", -0.6, 0.6),
+        Parameter::linear("wave_over_tilt", -0.6, 0.6),
     ],
     imitated: true,
     act: Act::Forces(act),
     ..DefectKind::cause(Location::Instrument, "the plate is tilted against the sensor")
 };
 
-/// Distance from the middle at which the bend is stated (m).
-const HALF_STROKE_M: f64 = 0.015;
+/// Length of the waves (m).
+const WAVE_M: f64 = 0.012;
 
 fn act(v: &Values, at: &Surroundings, forces: &mut Forces) {
-    let tilt = v[0] * (1.0 + v[1] * at.position_m / HALF_STROKE_M);
+    let wave = (2.0 * std::f64::consts::PI * at.position_m / WAVE_M).sin();
+    let tilt = v[0] * (1.0 + v[1] * wave);
     let (sin, cos) = tilt.sin_cos();
     let Forces { lateral_n, normal_n } = *forces;
     forces.lateral_n = lateral_n * cos + normal_n * sin;

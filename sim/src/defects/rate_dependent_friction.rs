@@ -1,7 +1,7 @@
-//! Friction that depends on the sliding speed as a thermally activated process does (Eyring): by asinh(U/U0),
-//! linear below U0 and logarithmic above, and falls again as fast sliding warms the bonds. A bond lasts as
-//! long as a junction takes to pass, so U0 goes with its width: less than the cube root of the load (Hertz),
-//! as there are more junctions too. Unchanged at 20 mm/s and 0.3 N.
+//! Friction that holds up to a speed and beyond it changes with the logarithm of the speed, until fast
+//! sliding warms the bonds. A bond lasts as long as a junction takes to pass, so the knee goes with its
+//! width: less than the cube root of the load (Hertz), as there are more junctions too. Unchanged at 20
+//! mm/s and 0.3 N.
 
 use super::*;
 
@@ -19,10 +19,12 @@ const REFERENCE_M_S: f64 = 0.02;
 const REFERENCE_N: f64 = 0.3;
 /// Power of the load by which a junction widens.
 const WIDENING: f64 = 1.0 / 6.0;
+/// Sharpness of the knee.
+const SHARP: f64 = 6.0;
 
 fn act(v: &Values, _: &Surroundings, contact: &mut Contact) {
     let wider = (contact.normal_force_n.max(0.0) / REFERENCE_N).powf(WIDENING);
-    let rise = |speed: f64, wider: f64| (speed / (v[1] * wider)).asinh() - v[2] * speed / 0.05;
+    let rise = |speed: f64, wider: f64| (speed / (v[1] * wider)).powf(SHARP).ln_1p() / SHARP - v[2] * speed / 0.05;
     let factor = 1.0 + v[0] * (rise(contact.speed_m_s, wider.max(0.1)) - rise(REFERENCE_M_S, 1.0));
     contact.friction *= factor.clamp(0.2, 3.0);
 }

@@ -1,4 +1,5 @@
-//! The spindle's eccentricity makes the speed rise and fall along the stroke, with a second harmonic.
+//! The spindle's eccentricity makes the speed rise and fall along the stroke, with a third harmonic
+//! from a coupling of three jaws.
 
 use super::*;
 
@@ -14,6 +15,6 @@ pub(super) const KIND: DefectKind = DefectKind {
 
 fn act(v: &Values, at: &Surroundings, contact: &mut Contact) {
     let phase = 2.0 * std::f64::consts::PI * at.position_m / v[1] + v[2];
-    let wave = phase.sin() + 0.2 * (2.0 * phase).sin();
+    let wave = phase.sin() + 0.2 * (3.0 * phase).sin();
     contact.speed_m_s *= (1.0 + v[0] * wave).max(0.02);
 }

@@ -1,22 +1,41 @@
 //! Ridges with mass: a table of the steady friction of a bouncing oscillator; nodes come on first use.
 //!
 //! In units of `k_n w/2` and radians: `r^2 x'' + 2 zeta r x' + s (x + depth) = force`, the plate at
-//! `sin(theta)`, `r = 2 pi f sqrt(m/k_n)`. The skin's surface is a spring of [`SURFACE`] times `k_n` with a
-//! dashpot, so that a landing takes time and gives back what the dashpot leaves; `s` is such that both
-//! springs in series are `k_n`. The table holds the ratio to a massless slider, so that it is exactly one
+//! `sin(theta)`, `r = 2 pi f sqrt(m/k_n)`. The skin's surface is a spring beside a dashpot ([`Surface`]), so
+//! that a landing takes time and gives back what the dashpot leaves; `s` is such that both springs in series
+//! are `k_n`. The table holds the ratio to a massless slider, so that it is exactly one
 //! where there is no mass. Its interpolation error is [`STATED_ERROR`].
 
 use crate::contact::{Contact, arc_load, half_contact_angle, lost_to_stick};
 use std::f64::consts::PI;
 use std::sync::OnceLock;
 
-/// Stiffness of the skin's surface over the normal stiffness.
-pub const SURFACE: f64 = 60.0;
-/// Stiffness of the ridge, so that both in series are the normal stiffness.
-const SPRING: f64 = SURFACE / (SURFACE - 1.0);
-/// Damping ratios of the surface under the ridge's mass that have tables: a landing without rebound and one
-/// that gives back about half of the speed.
-pub const LANDINGS: [f64; 2] = [1.0, 0.2];
+/// The skin's surface under the ridge's mass.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Surface {
+    /// Its stiffness over the normal stiffness.
+    pub stiffness: f64,
+    /// Its damping ratio under the ridge's mass.
+    pub damping: f64,
+}
+
+impl Surface {
+    /// Stiffness of the ridge, so that both in series are the normal stiffness.
+    fn ridge(&self) -> f64 {
+        self.stiffness / (self.stiffness - 1.0)
+    }
+    fn dashpot(&self, ratio: f64) -> f64 {
+        2.0 * self.damping * self.stiffness.sqrt() * ratio
+    }
+}
+
+/// Surfaces that have tables: a hard one that lands without rebound, one that gives back about half of the
+/// speed, and a soft one, where the mass lies within the skin rather than at its surface.
+pub const LANDINGS: [Surface; 3] = [
+    Surface { stiffness: 60.0, damping: 1.0 },
+    Surface { stiffness: 60.0, damping: 0.2 },
+    Surface { stiffness: 2.5, damping: 0.02 },
+];
 /// Error of mu' by interpolation, root mean square, measured between the nodes by the tests; half of all
 /// places lie within a thirtieth of it. The rest is where a bounce takes two cycles, or wanders.
 pub const STATED_ERROR: f64 = 0.007;
@@ -51,7 +70,7 @@ const DRAGS: usize = 20;
 type Node = OnceLock<[f32; DRAGS]>;
 
 fn table(landing: usize) -> &'static [Node] {
-    static TABLES: [OnceLock<Vec<Node>>; LANDINGS.len()] = [OnceLock::new(), OnceLock::new()];
+    static TABLES: [OnceLock<Vec<Node>>; LANDINGS.len()] = [const { OnceLock::new() }; LANDINGS.len()];
     let count = LOAD.count * RATIO.count * DAMPING.count;
     TABLES[landing].get_or_init(|| (0..count).map(|_| OnceLock::new()).collect())
 }
@@ -87,9 +106,9 @@ fn massless(load: f64, drag: f64) -> f64 {
 
 /// Amplitude of the force in a contact that never ends, over that of the massless slider: the dynamic
 /// stiffnesses of ridge and surface in series.
-fn swing(ratio: f64, damping: f64, landing: f64) -> f64 {
-    let ridge = (SPRING - ratio * ratio, 2.0 * damping * ratio);
-    let surface = (SURFACE, 2.0 * landing * SURFACE.sqrt() * ratio);
+fn swing(ratio: f64, damping: f64, landing: Surface) -> f64 {
+    let ridge = (landing.ridge() - ratio * ratio, 2.0 * damping * ratio);
+    let surface = (landing.stiffness, landing.dashpot(ratio));
     surface.0.hypot(surface.1) * ridge.0.hypot(ridge.1) / (ridge.0 + surface.0).hypot(ridge.1 + surface.1)
 }
 
@@ -150,8 +169,8 @@ pub struct Bouncing {
     pub ratio: f64,
     /// Damping ratio of the ridge.
     pub damping: f64,
-    /// Damping ratio of the skin's surface under the ridge's mass.
-    pub landing: f64,
+    /// The skin's surface.
+    pub landing: Surface,
 }
 
 /// Steps of a cycle.
@@ -221,17 +240,17 @@ impl Oscillator {
 }
 
 /// The ridge in flight and in contact.
-fn oscillators(ratio: f64, damping: f64, landing: f64, h: f64) -> [Oscillator; 2] {
+fn oscillators(ratio: f64, damping: f64, landing: Surface, h: f64) -> [Oscillator; 2] {
     let inertia = ratio * ratio;
     let ridge = 2.0 * damping * ratio;
-    let dashpot = 2.0 * landing * SURFACE.sqrt() * ratio;
-    let pull = SPRING / inertia;
+    let (surface, dashpot) = (landing.stiffness, landing.dashpot(ratio));
+    let pull = landing.ridge() / inertia;
     [
         Oscillator::new(0.5 * ridge / inertia, pull, (0.0, 0.0), pull, h),
         Oscillator::new(
             0.5 * (ridge + dashpot) / inertia,
-            (SPRING + SURFACE) / inertia,
-            (SURFACE / inertia, dashpot / inertia),
+            (landing.ridge() + surface) / inertia,
+            (surface / inertia, dashpot / inertia),
             pull,
             h,
         ),
@@ -245,9 +264,9 @@ impl Bouncing {
     /// does not repeat (a bounce may take two cycles, or wander) is averaged over many cycles.
     pub fn friction<const N: usize>(&self, drags: &[f64; N]) -> [f64; N] {
         let h = 2.0 * PI / STEPS as f64;
-        let dashpot = 2.0 * self.landing * SURFACE.sqrt() * self.ratio;
+        let (surface, dashpot) = (self.landing.stiffness, self.landing.dashpot(self.ratio));
         let [flight, pressed] = oscillators(self.ratio, self.damping, self.landing, h);
-        let force_at = |(x, v): (f64, f64), (s, c): (f64, f64)| SURFACE * (s - x) + dashpot * (c - v);
+        let force_at = |(x, v): (f64, f64), (s, c): (f64, f64)| surface * (s - x) + dashpot * (c - v);
         let (turn_s, turn_c) = h.sin_cos();
         let mut depth = if self.load >= 1.0 { self.load } else { -half_contact_angle(self.load, 0.0).cos() };
         let (mut state, mut touching, mut force) = ((0.0, 1.0), true, 0.0f64);

@@ -30,6 +30,7 @@ pub fn mean_friction(c: &Contact) -> f64 {
     let limits = &mut room[..=points];
     let pull = c.adhesion / scale;
     let load = c.load_ratio();
+    let carried = load * scale;
     let (arc, airborne) = if c.normal_retardation_time > 0.0 {
         let lag = omega * c.normal_retardation_time;
         let contact = Retarded::carrying(load, lag);
@@ -42,9 +43,10 @@ pub fn mean_friction(c: &Contact) -> f64 {
     } else {
         let phi = half_contact_angle(load, pull);
         let offset = if phi >= PI { load + pull } else { -phi.cos() };
+        let damping = c.indentation_damping * c.half_amplitude() * omega;
         let mut turn = Turn::new(-phi, 2.0 * phi / points as f64);
         for f in limits.iter_mut() {
-            *f = scale * (turn.cos + offset).max(0.0);
+            *f = scale * (turn.cos + offset).max(0.0) * (1.0 - (damping * turn.sin).tanh());
             turn.step();
         }
         (2.0 * phi, 2.0 * (PI - phi))
@@ -52,17 +54,23 @@ pub fn mean_friction(c: &Contact) -> f64 {
     let dt = arc / (points as f64 * omega);
     let always = airborne < 1e-9;
     // The friction limit over the contact, as the stretch at which the spring pulls as hard.
+    let (mut pressed, mut before) = (0.0, 0.0);
     for (i, f) in limits.iter_mut().enumerate() {
+        pressed += 0.5 * (before + *f) * dt / carried;
+        before = *f;
         let mut limit = c.mu0 * (*f + c.attraction.at(*f));
         if c.load_exponent != 0.0 {
             limit *= (*f / c.reference_load).max(1e-6).powf(c.load_exponent);
         }
         if c.bonding_time > 0.0 && !always {
-            let age = i as f64 * dt / c.bonding_time;
+            let age = if c.bonding_by_pressure { pressed } else { i as f64 * dt } / c.bonding_time;
             let age = if c.bonding_exponent == 1.0 { age } else { age.powf(c.bonding_exponent) };
-            limit *= -(-age).exp_m1();
+            limit *= 1.0 - c.bonding_share * (-age).exp();
         }
         *f = limit / c.lateral_stiffness;
+    }
+    if c.held.share > 0.0 && !always {
+        return c.held.mean_stretch(limits, c.speed * dt, [arc, airborne], omega) * c.lateral_stiffness;
     }
     let lateral = Lateral::new(c, dt, airborne / omega);
     // The map from the stretch at touch-down to that at the next one rises with slope at most one: its

@@ -13,7 +13,16 @@ pub(super) static EFFECT: Effect = Effect {
     source: "Derjaguin, Muller, Toporov 1975; Johnson, Kendall, Roberts 1971; capillary and van der Waals pull of tens of mN on a finger; \
              between a sphere and a plane it falls with the inverse square of the distance (Israelachvili 2011)",
     laws: &[
-        Law::new("DMT", &[FORCE]),
+        // The pull of a soft contact grows with its area, and with the speed at which it is peeled, or with
+        // the drive's stray voltage.
+        Law::new(
+            "DMT",
+            &[
+                FORCE,
+                Parameter::signed("load_exponent", "1", 0.15, -0.4, 0.7).bending(),
+                Parameter::signed("plate_speed_exponent", "1", 0.3, -1.0, 2.2).bending(),
+            ],
+        ),
         Law::new(
             "constant shear on the touching time",
             &[FORCE, Parameter::shape("build_up_time", "s", 3e-7, 1.5).bending()],
@@ -29,12 +38,25 @@ pub(super) static EFFECT: Effect = Effect {
         ),
         Law::new("JKR", &[Parameter::positive("pull_off_force", "N", 0.015, 0.5)]),
         Law::new("across the gap", &[FORCE, Parameter::shape("reach", "m", 3e-7, 1.2)]),
+        // Water condenses about the asperities above a humidity.
+        Law::new(
+            "menisci",
+            &[FORCE, Parameter::between("onset", "%", 25.0, 80.0), Parameter::shape("width", "%", 6.0, 0.5).bending()],
+        )
+        .needs(&[Need::Humidities]),
     ],
     near: &["normal_offset"],
     needs: &[Need::Loads],
-    change: |law, theta, _, design, c| {
+    change: |law, theta, pass, design, c| {
         match law {
-            0 => c.adhesion = theta[0],
+            0 => {
+                let load = (c.normal_force / design.reference_load_n).max(1e-3);
+                c.adhesion = theta[0] * load.powf(theta[1]) * design.plate_speed(c).powf(theta[2]);
+            }
+            5 => {
+                let humidity = pass.relative_humidity_pct.unwrap_or(theta[1]);
+                c.adhesion = theta[0] / (1.0 + ((theta[1] - humidity) / theta[2]).exp());
+            }
             1 => {
                 // Added friction for the share of the cycle in which the surfaces touch.
                 let touching = if c.amplitude_pp > STILL_PLATE_M {

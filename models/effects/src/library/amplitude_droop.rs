@@ -17,6 +17,9 @@ pub(super) static EFFECT: Effect = Effect {
             &[
                 Parameter::positive("droop_at_reference_load", "1", 0.2, 3.0),
                 Parameter::shape("load_exponent", "1", 0.8, 0.3).bending(),
+                // A supply that sags droops more the larger the amplitude; a reactance, with the frequency.
+                Parameter::signed("amplitude_exponent", "1", 0.3, -1.0, 1.5).bending(),
+                Parameter::signed("frequency_exponent", "1", 0.5, -2.0, 2.0).bending(),
             ],
         )
         .seen_by(CHECK, 0.015),
@@ -28,8 +31,10 @@ pub(super) static EFFECT: Effect = Effect {
     change: |law, theta, _, design, c| {
         c.amplitude_pp *= match law {
             0 => {
-                let relative = (c.normal_force / design.reference_load_n).max(0.0);
-                1.0 / (1.0 + theta[0] * relative.powf(theta[1]))
+                let load = (c.normal_force / design.reference_load_n).max(0.0).powf(theta[1]);
+                let amplitude = (c.amplitude_pp / design.largest_amplitude_m.max(1e-12)).max(1e-3).powf(theta[2]);
+                let frequency = (c.frequency / design.reference_frequency_hz).powf(theta[3]);
+                1.0 / (1.0 + theta[0] * load * amplitude * frequency)
             }
             _ => (1.0 - theta[0] * c.normal_force).max(0.02),
         };

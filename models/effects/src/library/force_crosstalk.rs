@@ -12,7 +12,7 @@ pub(super) static EFFECT: Effect = Effect {
     summary: "A share of the normal force is read as lateral force, the same in both directions (or the reverse).",
     source: "cross-talk of 0.3 to 13 % of uncalibrated multi-axis cells",
     laws: &[
-        Law::new("normal into lateral", &[Parameter::signed("crosstalk", "1", 0.03, -0.3, 0.3)])
+        Law::new("normal into lateral", &[Parameter::signed("crosstalk", "1", 0.03, -0.3, 0.3), ALONG, LOADED])
             .certified_by(CertifiedKey::Crosstalk)
             .same_as("plate_tilt", "rotation")
             .seen_by(CHECK, 0.001),
@@ -22,16 +22,16 @@ pub(super) static EFFECT: Effect = Effect {
     ],
     departs_by: 0.05,
     near: &["plate_tilt"],
-    acts: Some(Acts { on: Input::Crosstalk, over: &[&covariate::NORMAL_FORCE] }),
+    acts: Some(Acts { on: Input::Crosstalk, over: &[&covariate::NORMAL_FORCE, &covariate::POSITION] }),
     needs: &[Need::Directions],
     change: |law, theta, pass, _, c| {
         if law == 1 {
             super::plate_tilt::unload(c, pass.direction.sign(), -theta[0]);
         }
     },
-    read: |law, theta, _, _, reading| {
+    read: |law, theta, pass, design, reading| {
         if law == 0 {
-            reading.crosstalk += theta[0];
+            reading.crosstalk += bent(theta, pass, design);
         }
     },
     ..Effect::NONE

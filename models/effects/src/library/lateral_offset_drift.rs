@@ -21,6 +21,7 @@ pub(super) static EFFECT: Effect = Effect {
             &[
                 Parameter::signed("change", "N", 0.015, -0.4, 0.4),
                 Parameter::shape("time_constant_over_duration", "1", 0.3, 0.8),
+                IN_RUN,
             ],
         )
         .seen_by(CHECK, 0.0005),
@@ -48,7 +49,7 @@ pub(super) static EFFECT: Effect = Effect {
                 let warmer = pass.temperature_c.map_or(0.0, |t| t - design.reference_temperature_c);
                 theta[0] + theta[1] * warmer
             }
-            _ => -theta[0] * (-s.max(0.0) / theta[1]).exp_m1(),
+            _ => -theta[0] * (-pass.elapsed_s(theta[2]) / (theta[1] * design.duration_s.max(1e-9))).exp_m1(),
         };
     },
     ..Effect::NONE

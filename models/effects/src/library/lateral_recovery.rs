@@ -1,6 +1,7 @@
 //! The skin's lateral stretch does not vanish at lift-off but recovers at a finite rate.
 
 use super::prelude::*;
+use crate::contact::Held;
 
 /// A speed of recovery that falls with the stretch below a knee: a limit of speed for long stretches, of time for short ones.
 const LIMITS: [Parameter; 2] = [
@@ -15,6 +16,18 @@ const RELAXES: [Parameter; 2] = [
     Parameter::positive("share_that_grows_with_stretch", "1", 0.5, 0.99).bending(),
 ];
 
+/// A share of each contact's stretch stays in the tissue below and is added to that of the next.
+const HELD: [Parameter; 5] = [
+    Parameter::positive("share_held", "1", 0.4, 3.0),
+    Parameter::shape("relaxation_time", "s", 25e-6, 1.0),
+    // Tissue has many relaxation times: none of spread is an exponential, one a hyperbola.
+    Parameter::positive("spread_of_times", "1", 0.7, 3.0).bending(),
+    // The bulk follows the mean stretch of a cycle, the skin its largest.
+    Parameter::between("weight_of_mean", "1", 0.0, 1.0).bending(),
+    // Stretch within an elastic range comes back.
+    Parameter::positive("elastic_range", "m", 0.15e-6, 2e-6).bending(),
+];
+
 pub(super) static EFFECT: Effect = Effect {
     name: "lateral_recovery",
     place: Location::Contact,
@@ -24,12 +37,14 @@ pub(super) static EFFECT: Effect = Effect {
         Law::new("rate limit, slower near rest", &LIMITS),
         Law::new("exponential", &RELAXES),
         Law::new("slip against viscosity", &RELAXES),
+        Law::new("held in the tissue", &HELD),
     ],
     needs: &[Need::Vibration],
     change: |law, theta, _, _, c| {
         c.viscous_slip = law == 2;
         match law {
             0 => (c.inverse_recovery_speed, c.recovery_knee) = (theta[0], theta[1]),
+            3 => c.held = Held { share: theta[0], time: theta[1], spread: theta[2], of_mean: theta[3], elastic: theta[4] },
             _ => (c.lateral_relaxation_time, c.relaxation_growth) = (theta[0], theta[1]),
         }
     },

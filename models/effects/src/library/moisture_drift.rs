@@ -2,10 +2,19 @@
 
 use super::prelude::*;
 
+/// Relative humidity at which the change is as stated, percent.
+const ROOM_HUMIDITY_PCT: f64 = 45.0;
 /// The characteristic time of an approach.
 const TIME: Parameter = Parameter::shape("time_constant", "s", 60.0, 1.4);
 /// The parameters of an exponential approach.
 const APPROACH: &[Parameter] = &[Parameter::signed("relative_change", "1", 0.4, -0.8, 9.0), TIME];
+/// The same in each run. Skin need not dry between runs, and it takes up what the air holds.
+const IN_EACH_RUN: &[Parameter] = &[
+    APPROACH[0],
+    TIME,
+    Parameter::positive("share_of_time_that_lasts", "1", 0.3, 1.0).bending(),
+    Parameter::signed("humidity_exponent", "1", 0.5, -1.0, 3.0).bending(),
+];
 
 pub(super) static EFFECT: Effect = Effect {
     name: "moisture_drift",
@@ -25,15 +34,29 @@ pub(super) static EFFECT: Effect = Effect {
                 Parameter::shape("onset_time", "s", 20.0, 1.2),
             ],
         ),
-        Law::new("exponential approach in each run", APPROACH).needs(&[Need::Runs]),
+        Law::new(
+            "exponential approach in each run",
+            IN_EACH_RUN,
+        )
+        .needs(&[Need::Runs]),
+        Law::new(
+            "with the humidity of the air",
+            &[Parameter::signed("exponent", "1", 0.3, -2.0, 3.0)],
+        )
+        .needs(&[Need::Humidities]),
     ],
     acts: Some(Acts { on: Input::Friction, over: &[&covariate::TIME] }),
     needs: &[Need::Time],
     change: |law, theta, pass, _, c| {
-        let time = pass.elapsed_s(if law == 3 { 1.0 } else { 0.0 });
+        let (in_run, humid) = match *theta {
+            [.., lasts, exponent] if law == 3 => (1.0 - lasts, humidity(pass).powf(exponent)),
+            _ => (0.0, 1.0),
+        };
+        let time = pass.elapsed_s(in_run);
         let factor = match law {
             2 => 1.0 + theta[0] * (1.0 + time / theta[1]).ln(),
-            _ => 1.0 - theta[0] * (-time / theta[1]).exp_m1(),
+            4 => humidity(pass).powf(theta[0]),
+            _ => 1.0 - theta[0] * humid * (-time / theta[1]).exp_m1(),
         }
         .max(0.05);
         c.mu0 *= factor;
@@ -46,3 +69,8 @@ pub(super) static EFFECT: Effect = Effect {
     },
     ..Effect::NONE
 };
+
+/// Relative humidity over that of a room; one where it was not measured.
+fn humidity(pass: &Condition) -> f64 {
+    pass.relative_humidity_pct.map_or(1.0, |h| h.max(1.0) / ROOM_HUMIDITY_PCT)
+}

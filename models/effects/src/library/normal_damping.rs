@@ -10,7 +10,8 @@ pub(super) static EFFECT: Effect = Effect {
     name: "normal_damping",
     place: Location::Contact,
     summary: "A dashpot beside the normal spring changes how long, and how hard, ridge and plate touch.",
-    source: "Kelvin-Voigt normal spring; damping ratios 0.05 to 1 of ridges at 26 to 114 kHz; Friesen 2016",
+    source: "Kelvin-Voigt normal spring; damping ratios 0.05 to 1 of ridges at 26 to 114 kHz; Friesen 2016; \
+             Hunt and Crossley 1975",
     laws: &[
         Law::new("Kelvin-Voigt", &[Parameter::positive("retardation_time", "s", 4e-6, 1e-4), THICKENS]),
         Law::new("constant loss factor", &[Parameter::positive("loss_factor", "1", 0.6, 10.0), THICKENS]),
@@ -22,10 +23,16 @@ pub(super) static EFFECT: Effect = Effect {
                 Parameter::shape("relaxation_time", "s", 5e-6, 1.0),
             ],
         ),
+        // A dashpot that grows with the indentation, so that the force does not jump at touch-down.
+        Law::new("Hunt and Crossley", &[Parameter::positive("damping_per_speed", "s/m", 6.0, 60.0)]),
     ],
     near: &["ridge_inertia"],
     needs: &[Need::Vibration],
     change: |law, theta, _, design, c| {
+        if law == 3 {
+            c.indentation_damping = theta[0];
+            return;
+        }
         let omega = 2.0 * std::f64::consts::PI * c.frequency;
         c.normal_retardation_time = match law {
             0 => theta[0] * design.plate_speed(c).powf(theta[1]),

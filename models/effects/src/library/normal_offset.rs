@@ -14,13 +14,27 @@ pub(super) static EFFECT: Effect = Effect {
         Law::new("constant", &[Parameter::signed("offset", "N", 0.03, -0.5, 0.5)])
             .certified_by(CertifiedKey::NormalOffset)
             .seen_by(CHECK, 0.001),
-        Law::new("drift over the table", &[Parameter::signed("offset", "N", 0.03, -0.5, 0.5)])
-            .seen_by(CHECK, 0.001),
+        Law::new(
+            "drift over the table",
+            &[
+                Parameter::signed("offset", "N", 0.03, -0.5, 0.5),
+                Parameter::signed("share_at_start", "1", 0.5, -2.0, 2.0).bending(),
+                IN_RUN,
+                // A cable that trails along.
+                ALONG,
+            ],
+        )
+        .seen_by(CHECK, 0.001),
     ],
     acts: Some(Acts { on: Input::Load, over: &[&covariate::TIME] }),
     needs: &[Need::Loads],
     change: |law, theta, pass, design, c| {
-        let share = if law == 0 { 1.0 } else { pass.time_s / design.duration_s.max(1e-9) };
+        let share = if law == 0 {
+            1.0
+        } else {
+            let elapsed = pass.elapsed_s(theta[2]) / design.duration_s.max(1e-9);
+            (theta[1] + (1.0 - theta[1]) * elapsed) * bent(&[1.0, theta[3], 0.0], pass, design)
+        };
         c.normal_force = (c.normal_force - theta[0] * share).max(LEAST_SHARE * c.normal_force);
     },
     ..Effect::NONE

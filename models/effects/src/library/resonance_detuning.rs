@@ -27,6 +27,7 @@ pub(super) static EFFECT: Effect = Effect {
             &[
                 Parameter::positive("quality_factor", "1", 60.0, 600.0),
                 Parameter::between("resonance_over_reference", "1", 0.7, 1.4),
+                Parameter::signed("softening_at_largest_amplitude", "1", 0.005, -0.1, 0.1).bending(),
             ],
         )
         .needs(&[Need::Frequencies])
@@ -52,7 +53,7 @@ pub(super) static EFFECT: Effect = Effect {
                 Parameter::signed("softening_at_largest_amplitude", "1", 0.3, -3.0, 3.0),
                 STEEPNESS,
                 // A plate that is left alone between runs cools.
-                Parameter::positive("share_of_time_in_run", "1", 0.4, 1.0).bending(),
+                IN_RUN,
             ],
         )
         .seen_by(CHECK, 0.05),
@@ -75,7 +76,7 @@ pub(super) static EFFECT: Effect = Effect {
             0 => theta[0] * warmer(),
             1 => -theta[0] * faded(),
             2 => {
-                let r = pass.frequency_hz / (design.reference_frequency_hz * theta[1]);
+                let r = pass.frequency_hz / (design.reference_frequency_hz * theta[1] * (1.0 - theta[2] * swing));
                 theta[0] * (r - 1.0 / r)
             }
             4 => theta[0] * (warmer() - theta[1] + theta[2] * swing),

@@ -23,6 +23,8 @@ pub(super) static EFFECT: Effect = Effect {
             &[
                 Parameter::signed("log_gain", "1", 0.15, -1.0, 1.0),
                 Parameter::signed("growth_with_log_speed", "1", 0.1, -0.5, 0.5),
+                // A cable pulls one way.
+                Parameter::signed("growth_forward", "1", 0.3, -2.0, 2.0).bending(),
             ],
         )
         .seen_by(CHECK, 0.003),
@@ -30,10 +32,14 @@ pub(super) static EFFECT: Effect = Effect {
     near: &["amplitude_miscalibration"],
     acts: Some(Acts { on: Input::Speed, over: &[&covariate::SPEED] }),
     needs: &[Need::Vibration],
-    change: |law, theta, _, design, c| match law {
+    change: |law, theta, pass, design, c| match law {
         0 => c.speed *= theta[0].exp(),
         1 => c.speed = (c.speed + theta[0]).max(0.05 * c.speed),
-        _ => c.speed *= (theta[0] * (1.0 + theta[1] * (c.speed / design.reference_speed_m_s).ln())).exp(),
+        _ => {
+            let faster = (c.speed / design.reference_speed_m_s).ln();
+            let growth = 1.0 + theta[1] * faster + theta[2] * pass.direction.sign();
+            c.speed *= (theta[0] * growth).exp();
+        }
     },
     ..Effect::NONE
 };

@@ -25,6 +25,8 @@ pub(super) static EFFECT: Effect = Effect {
                 Parameter::signed("log_normal_factor", "1", 0.5, -2.0, 2.0),
                 Parameter::signed("growth_per_e_fold_of_load", "1", 0.3, -1.0, 1.0).bending(),
                 Parameter::signed("lateral_over_normal_e_folds", "1", 0.3, -1.0, 1.0).bending(),
+                // Skin has a grain.
+                Parameter::signed("lateral_forward_e_folds", "1", 0.1, -1.0, 1.0).bending(),
             ],
         ),
         Law::new("both, growing with the load", &[Parameter::signed("load_exponent", "1", 0.25, -0.7, 1.0)])
@@ -33,7 +35,7 @@ pub(super) static EFFECT: Effect = Effect {
     near: &["speed_error", "amplitude_miscalibration", "subsurface_relaxation"],
     acts: Some(Acts { on: Input::Stiffness, over: &[&covariate::NORMAL_FORCE] }),
     needs: &[Need::Vibration],
-    change: |law, theta, _, design, c| {
+    change: |law, theta, pass, design, c| {
         let load_e_folds = (c.normal_force / design.reference_load_n).max(LEAST_LOAD).ln();
         let [normal, lateral] = match law {
             0 => [0.0, theta[0]],
@@ -41,7 +43,7 @@ pub(super) static EFFECT: Effect = Effect {
             2 => [theta[0]; 2],
             3 => {
                 let normal = theta[0] * (1.0 + theta[1] * load_e_folds);
-                [normal, normal * (1.0 + theta[2])]
+                [normal, normal * (1.0 + theta[2]) + theta[0] * theta[3] * pass.direction.sign()]
             }
             _ => [theta[0] * load_e_folds; 2],
         };

@@ -9,14 +9,13 @@ const ONE_TIME: &[Parameter] = &[
 ];
 /// Tissue has no single relaxation time: Kohlrausch's function, the usual one for a broad spectrum of times.
 const BROAD: &[Parameter] = &[ONE_TIME[0], ONE_TIME[1], Parameter::shape("exponent", "1", 0.6, 0.3), IN_RUN];
-/// Tissue that is left alone between runs recovers in part.
-const IN_RUN: Parameter = Parameter::positive("share_of_time_in_run", "1", 0.4, 1.0).bending();
 /// Those of a creep with one time constant and rests.
 const RESTED: &[Parameter] = &[ONE_TIME[0], ONE_TIME[1], IN_RUN];
 /// Those of a logarithmic creep.
 const LOGARITHMIC: &[Parameter] = &[
     Parameter::signed("relative_change_per_e_fold", "1", 0.12, -0.15, 1.5),
     Parameter::shape("onset_time", "s", 5.0, 1.2),
+    IN_RUN,
 ];
 
 pub(super) static EFFECT: Effect = Effect {
@@ -35,7 +34,7 @@ pub(super) static EFFECT: Effect = Effect {
     acts: Some(Acts { on: Input::Stiffness, over: &[&covariate::TIME] }),
     needs: &[Need::Vibration, Need::Time],
     change: |law, theta, pass, _, c| {
-        let rests = if matches!(law, 0 | 4) { theta[theta.len() - 1] } else { 0.0 };
+        let rests = if law == 2 { 0.0 } else { theta[theta.len() - 1] };
         let time = pass.elapsed_s(rests) / theta[1];
         let factor = match law {
             1 | 3 => 1.0 + theta[0] * (1.0 + time).ln(),
