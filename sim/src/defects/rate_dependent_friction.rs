@@ -24,7 +24,8 @@ const SHARP: f64 = 6.0;
 
 fn act(v: &Values, _: &Surroundings, contact: &mut Contact) {
     let wider = (contact.normal_force_n.max(0.0) / REFERENCE_N).powf(WIDENING);
-    let rise = |speed: f64, wider: f64| (speed / (v[1] * wider)).powf(SHARP).ln_1p() / SHARP - v[2] * speed / 0.05;
+    let rise =
+        |speed: f64, wider: f64| (speed / (v[1] * wider)).powf(SHARP).ln_1p() / SHARP - v[2] * speed / 0.05;
     let factor = 1.0 + v[0] * (rise(contact.speed_m_s, wider.max(0.1)) - rise(REFERENCE_M_S, 1.0));
     contact.friction *= factor.clamp(0.2, 3.0);
 }

@@ -41,7 +41,11 @@ pub(super) static EFFECT: Effect = Effect {
         // Water condenses about the asperities above a humidity.
         Law::new(
             "menisci",
-            &[FORCE, Parameter::between("onset", "%", 25.0, 80.0), Parameter::shape("width", "%", 6.0, 0.5).bending()],
+            &[
+                FORCE,
+                Parameter::between("onset", "%", 25.0, 80.0),
+                Parameter::shape("width", "%", 6.0, 0.5).bending(),
+            ],
         )
         .needs(&[Need::Humidities]),
     ],

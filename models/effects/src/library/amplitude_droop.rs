@@ -32,7 +32,8 @@ pub(super) static EFFECT: Effect = Effect {
         c.amplitude_pp *= match law {
             0 => {
                 let load = (c.normal_force / design.reference_load_n).max(0.0).powf(theta[1]);
-                let amplitude = (c.amplitude_pp / design.largest_amplitude_m.max(1e-12)).max(1e-3).powf(theta[2]);
+                let amplitude =
+                    (c.amplitude_pp / design.largest_amplitude_m.max(1e-12)).max(1e-3).powf(theta[2]);
                 let frequency = (c.frequency / design.reference_frequency_hz).powf(theta[3]);
                 1.0 / (1.0 + theta[0] * load * amplitude * frequency)
             }

@@ -42,7 +42,8 @@ pub(super) static EFFECT: Effect = Effect {
             0 => c.amplitude_pp *= theta[0].exp(),
             1 => c.amplitude_pp = (c.amplitude_pp - theta[0]).max(0.0),
             _ => {
-                let amplitude = (c.amplitude_pp / design.largest_amplitude_m.max(1e-12)).max(LEAST_AMPLITUDE).ln();
+                let amplitude =
+                    (c.amplitude_pp / design.largest_amplitude_m.max(1e-12)).max(LEAST_AMPLITUDE).ln();
                 let frequency = (c.frequency / design.reference_frequency_hz).ln();
                 let log_gain = theta[0] * (1.0 + theta[1] * frequency) * (1.0 + theta[2] * amplitude);
                 c.amplitude_pp *= log_gain.clamp(-MOST_E_FOLDS, MOST_E_FOLDS).exp();

@@ -12,7 +12,10 @@ pub(super) static EFFECT: Effect = Effect {
     source: "stochastic adhesion (section 5.4 of the paper); bonding times of 1 to 100 us",
     laws: &[
         Law::new("first order", &[TIME]),
-        Law::new("a share at once, the rest stretched", &[TIME, WAITS, Parameter::shape("exponent", "1", 0.75, 0.3).bending()]),
+        Law::new(
+            "a share at once, the rest stretched",
+            &[TIME, WAITS, Parameter::shape("exponent", "1", 0.75, 0.3).bending()],
+        ),
         Law::new("a share at once, the rest by mean contact time", &[TIME, WAITS]),
         // A junction forms as it is pressed: by the normal force of the instant over its mean.
         Law::new("a share at once, the rest by pressing", &[TIME, WAITS]),

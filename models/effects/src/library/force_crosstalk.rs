@@ -12,10 +12,13 @@ pub(super) static EFFECT: Effect = Effect {
     summary: "A share of the normal force is read as lateral force, the same in both directions (or the reverse).",
     source: "cross-talk of 0.3 to 13 % of uncalibrated multi-axis cells",
     laws: &[
-        Law::new("normal into lateral", &[Parameter::signed("crosstalk", "1", 0.03, -0.3, 0.3), ALONG, LOADED])
-            .certified_by(CertifiedKey::Crosstalk)
-            .same_as("plate_tilt", "rotation")
-            .seen_by(CHECK, 0.001),
+        Law::new(
+            "normal into lateral",
+            &[Parameter::signed("crosstalk", "1", 0.03, -0.3, 0.3), ALONG, LOADED],
+        )
+        .certified_by(CertifiedKey::Crosstalk)
+        .same_as("plate_tilt", "rotation")
+        .seen_by(CHECK, 0.001),
         Law::new("lateral into normal", &[Parameter::signed("crosstalk", "1", 0.08, -0.5, 0.5)])
             .certified_by(CertifiedKey::CrosstalkOntoNormal)
             .seen_by(CHECK, 0.001),

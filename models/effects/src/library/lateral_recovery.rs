@@ -44,7 +44,15 @@ pub(super) static EFFECT: Effect = Effect {
         c.viscous_slip = law == 2;
         match law {
             0 => (c.inverse_recovery_speed, c.recovery_knee) = (theta[0], theta[1]),
-            3 => c.held = Held { share: theta[0], time: theta[1], spread: theta[2], of_mean: theta[3], elastic: theta[4] },
+            3 => {
+                c.held = Held {
+                    share: theta[0],
+                    time: theta[1],
+                    spread: theta[2],
+                    of_mean: theta[3],
+                    elastic: theta[4],
+                }
+            }
             _ => (c.lateral_relaxation_time, c.relaxation_growth) = (theta[0], theta[1]),
         }
     },

@@ -34,16 +34,9 @@ pub(super) static EFFECT: Effect = Effect {
                 Parameter::shape("onset_time", "s", 20.0, 1.2),
             ],
         ),
-        Law::new(
-            "exponential approach in each run",
-            IN_EACH_RUN,
-        )
-        .needs(&[Need::Runs]),
-        Law::new(
-            "with the humidity of the air",
-            &[Parameter::signed("exponent", "1", 0.3, -2.0, 3.0)],
-        )
-        .needs(&[Need::Humidities]),
+        Law::new("exponential approach in each run", IN_EACH_RUN).needs(&[Need::Runs]),
+        Law::new("with the humidity of the air", &[Parameter::signed("exponent", "1", 0.3, -2.0, 3.0)])
+            .needs(&[Need::Humidities]),
     ],
     acts: Some(Acts { on: Input::Friction, over: &[&covariate::TIME] }),
     needs: &[Need::Time],

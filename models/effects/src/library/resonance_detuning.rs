@@ -76,7 +76,8 @@ pub(super) static EFFECT: Effect = Effect {
             0 => theta[0] * warmer(),
             1 => -theta[0] * faded(),
             2 => {
-                let r = pass.frequency_hz / (design.reference_frequency_hz * theta[1] * (1.0 - theta[2] * swing));
+                let r =
+                    pass.frequency_hz / (design.reference_frequency_hz * theta[1] * (1.0 - theta[2] * swing));
                 theta[0] * (r - 1.0 / r)
             }
             4 => theta[0] * (warmer() - theta[1] + theta[2] * swing),

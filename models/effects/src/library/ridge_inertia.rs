@@ -18,7 +18,11 @@ pub(super) static EFFECT: Effect = Effect {
     place: Location::Contact,
     summary: "Ridges thrown off by the plate are touched for a shorter part of the cycle; breaks the collapse on w f.",
     source: "areal mass of 0.3 mm of skin over 34 mm2 gives 8 mg; damping ratios 0.05 to 1 (Friesen 2016)",
-    laws: &[Law::new("landing without rebound", FLIGHT), Law::new("rebounding", FLIGHT), Law::new("within soft skin", FLIGHT)],
+    laws: &[
+        Law::new("landing without rebound", FLIGHT),
+        Law::new("rebounding", FLIGHT),
+        Law::new("within soft skin", FLIGHT),
+    ],
     interpolation_error: crate::contact::impact::STATED_ERROR,
     needs: &[Need::Vibration],
     change: |law, theta, _, design, c| {
