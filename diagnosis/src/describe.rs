@@ -36,6 +36,11 @@ pub struct Description {
     pub text: String,
 }
 
+/// A name of a cause, a pair or a parameter as it stands in a sentence.
+pub fn plain(name: &str) -> String {
+    name.replace(" + ", "+").replace('+', " + ").replace('_', " ")
+}
+
 /// A probability as it can be read: neither certainty nor impossibility is claimed.
 pub fn probability(p: f64) -> String {
     match p {

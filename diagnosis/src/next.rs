@@ -12,6 +12,7 @@ pub mod predictive;
 
 use crate::data::{RigFile, Table};
 use crate::decision::{Decision, Verdict};
+use crate::describe::plain;
 use crate::fitted::Fitted;
 use models::condition::Condition;
 use models::covariate;
@@ -77,8 +78,8 @@ pub fn experiments(fitted: &Fitted, table: &Table, rig: &RigFile, decision: &Dec
                 conditions: chosen.iter().map(|&i| grid[i]).collect(),
                 text: format!(
                     "{PASSES} more passes would separate {} from {} and the rest ({} expected)",
-                    names[0].replace('_', " "),
-                    names[1].replace('_', " "),
+                    plain(&names[0]),
+                    plain(&names[1]),
                     odds(nats)
                 ),
                 separates: names,

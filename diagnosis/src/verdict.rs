@@ -2,7 +2,7 @@
 
 use crate::data::{RigFile, Table};
 use crate::decision::{Decision, Verdict, decide};
-use crate::describe::{Description, at_least, description, probability};
+use crate::describe::{Description, at_least, description, plain, probability};
 use crate::hypotheses::{Fitted, Options, fit_all};
 use crate::intervals::{Estimate, curvature, estimates};
 use crate::law::LawNote;
@@ -273,7 +273,7 @@ fn sentence(fitted: &Fitted, decision: &Decision, gap: &Gap, answer: &Answer) ->
         format!("with {with} the gap {verb} by {percent:.0} %{within} on passes that were not fitted")
     };
     let leader = decision.leader().unwrap_or_default();
-    let words = |candidate: usize| label(fitted, candidate).replace('_', " ");
+    let words = |candidate: usize| plain(&label(fitted, candidate));
     match decision.verdict {
         Verdict::NoGap if decision.none < 0.5 => format!(
             "No gap is shown: the recalibrated model may explain the table (probability {}).",
@@ -312,7 +312,7 @@ fn sentence(fitted: &Fitted, decision: &Decision, gap: &Gap, answer: &Answer) ->
             let seen = description(fitted, decision);
             let hint = match (known, seen.first()) {
                 (Some(s), _) => {
-                    let names = s.names().join("+").replace('_', " ");
+                    let names = plain(&s.names().join("+"));
                     format!(" The nearest known effect is not in the library: {names}.")
                 }
                 (None, Some(d)) => format!(" It looks like {}.", d.text),

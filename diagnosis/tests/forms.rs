@@ -62,6 +62,7 @@ fn named(causes: &[&str]) {
     causes.par_iter().for_each(|cause| {
         let (verdict, text, mut effects) = diagnosed(cause);
         assert_eq!(verdict, Verdict::Named, "{cause}: {text}");
+        assert!(!text.replace(" + ", " ").contains('+'), "a pair is not written as one word: {text}");
         effects.sort_unstable();
         assert_eq!(effects.join("+"), *cause, "{text}");
     });

@@ -5,6 +5,7 @@ pub mod files;
 
 use crate::report::human::{quantity, with_interval};
 use diagnosis::certificates;
+pub(crate) use diagnosis::describe::plain;
 use diagnosis::describe::probability;
 use diagnosis::intervals::{Estimate, Shape};
 use diagnosis::verdict::{Diagnosis, Hypothesis};
@@ -89,11 +90,6 @@ pub fn plan(experiment: &diagnosis::next::Experiment) -> String {
 /// Odds in words, from their logarithm to the base 10.
 pub fn odds_base10(log: f64) -> String {
     if log > 6.0 { "odds above 10^6 to 1".into() } else { format!("odds of {:.0} to 1", 10f64.powf(log)) }
-}
-
-/// An effect's or a parameter's name in words.
-pub(crate) fn plain(name: &str) -> String {
-    name.replace('_', " ")
 }
 
 /// A parameter's value with its interval, or as assumed where the table adds nothing to the prior.
