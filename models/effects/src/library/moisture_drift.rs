@@ -19,7 +19,7 @@ const IN_EACH_RUN: &[Parameter] = &[
 pub(super) static EFFECT: Effect = Effect {
     name: "moisture_drift",
     place: Location::Contact,
-    summary: "Friction drifts as the skin under the finger takes up water, with the plate still as well as vibrating.",
+    summary: "Friction drifts as the skin takes up water, by occlusion or from the air, with the plate still as well as vibrating.",
     source: "occlusion with a characteristic time of 20 s, up to tenfold (Dzidek 2014); 5 to 2000 s allowed",
     laws: &[
         Law::new("exponential approach", APPROACH),
