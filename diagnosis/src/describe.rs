@@ -36,7 +36,7 @@ pub struct Description {
     pub text: String,
 }
 
-/// A name of a cause, a pair or a parameter as it stands in a sentence.
+/// A name of a cause, a pair or a parameter as a sentence has it.
 pub fn plain(name: &str) -> String {
     name.replace(" + ", "+").replace('+', " + ").replace('_', " ")
 }

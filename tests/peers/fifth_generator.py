@@ -51,7 +51,7 @@ def floating_gap(m, s, rest, decay):
 
 
 def strip_film(m, s, gap, width):
-    """Linearised Reynolds film of vented strips (Blech): its spring stands beside that of the skin."""
+    """Linearised Reynolds film of vented strips (Blech): its spring acts beside that of the skin."""
     z = np.sqrt(np.minimum(6 * 1.8e-5 * TAU * m.f * width ** 2 / (m.p * gap ** 2), 4e3))
     trapped = 1 - (np.sinh(z) + np.sin(z)) / (np.cosh(z) + np.cos(z)) / z
     return dict(borne=1 / (1 + 1.25 * s * m.p * (m.w / 2 / gap) ** 2 * trapped / m.F))
@@ -145,7 +145,7 @@ FORM_TABLE = [
     ("normal", "squeeze_film", "floating_gap", 1e-8, 8e-5, 0, [(1.5 * UM, 5 * UM), (0.3 * UM, 1 * UM)], "",
      "film on an area s that opens the gap and so unloads asperities of exponential compliance", floating_gap),
     ("normal", "squeeze_film", "vented_strips", 1e-8, 2e-4, 0, [(1 * UM, 4 * UM), (0.1 * MM, 0.5 * MM)], "",
-     "Blech's film of strips on an area s, vented by the grooves; its spring stands beside the skin's", strip_film),
+     "Blech's film of strips on an area s, vented by the grooves; its spring acts beside the skin's", strip_film),
     ("shear", "lateral_recovery", "swinging_ridge", 0.01, 1.5, 0, [(3e3, 12e3), (0.3, 0.8)], "",
      "a ridge with mass sets off slowly when let go, and may swing past its rest (own frequency, damping ratio)",
      lambda m, s, own, zeta: dict(kept=lambda peak, mean, off: s * peak * released(off, own, zeta))),

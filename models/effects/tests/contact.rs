@@ -331,7 +331,7 @@ fn a_limit_that_slips_all_the_time_has_the_mean_of_its_closed_form() {
 /// one, which is `(Ut/2 + x0)` for the share `d` of the cycle, `x0 = a d Ut/2/(1 - a d)`.
 #[test]
 fn what_the_tissue_holds_is_the_sum_of_a_geometric_series() {
-    let c = contact(4e-6, 1e-5, 0.5, 2e6, 0.8e6);
+    let c = contact(4e-6, 2e-6, 0.5, 2e6, 0.8e6);
     let duty = half_contact_angle(c.load_ratio(), 0.0) / PI;
     let way = c.speed * duty / c.frequency;
     let flight = (1.0 - duty) / c.frequency;
@@ -345,5 +345,13 @@ fn what_the_tissue_holds_is_the_sum_of_a_geometric_series() {
             let mean = mean_friction(&held);
             assert!((mean / expected - 1.0).abs() < 0.02, "{share} {of_mean}: {mean} for {expected}");
         }
+        // Of a stretch x, x/(x + y) of the share: `x0 (x0 + Ut + y) = a (x0 + Ut)^2`.
+        let elastic = 0.5 * way;
+        let (half, square) = (0.5 * (way + elastic - 2.0 * a * way) / (1.0 - a), a * way * way / (1.0 - a));
+        let x0 = (half * half + square).sqrt() - half;
+        let held = Contact { held: Held { share, time, spread, of_mean: 0.0, elastic }, ..c };
+        let expected = c.lateral_stiffness * duty * (0.5 * way + x0);
+        let mean = mean_friction(&held);
+        assert!((mean / expected - 1.0).abs() < 0.02, "{share} elastic: {mean} for {expected}");
     }
 }

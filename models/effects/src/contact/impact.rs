@@ -374,7 +374,7 @@ mod tests {
     #[test]
     fn a_prepared_table_makes_no_node_when_asked() {
         let effect = by_name("ridge_inertia").expect("an effect of the library");
-        for (law, exponent, dampings) in [(0, 0.0, 2), (1, 0.6, 6)] {
+        for (law, exponent, dampings) in [(0, 0.0, 2), (1, 0.6, 6), (2, 0.0, 2)] {
             let made = || table(law).iter().filter(|node| node.get().is_some()).count();
             (effect.prepare)(law, &[1e-5, 0.35, exponent]);
             let before = made();

@@ -46,7 +46,10 @@ pub fn mean_friction(c: &Contact) -> f64 {
         let damping = c.indentation_damping * c.half_amplitude() * omega;
         let mut turn = Turn::new(-phi, 2.0 * phi / points as f64);
         for f in limits.iter_mut() {
-            *f = scale * (turn.cos + offset).max(0.0) * (1.0 - (damping * turn.sin).tanh());
+            *f = scale * (turn.cos + offset).max(0.0);
+            if damping > 0.0 {
+                *f *= 1.0 - (damping * turn.sin).tanh();
+            }
             turn.step();
         }
         (2.0 * phi, 2.0 * (PI - phi))
@@ -54,9 +57,9 @@ pub fn mean_friction(c: &Contact) -> f64 {
     let dt = arc / (points as f64 * omega);
     let always = airborne < 1e-9;
     // The friction limit over the contact, as the stretch at which the spring pulls as hard.
-    let (mut pressed, mut before) = (0.0, 0.0);
+    let (mut pressed, mut before, unit) = (0.0, 0.0, 0.5 * dt / carried);
     for (i, f) in limits.iter_mut().enumerate() {
-        pressed += 0.5 * (before + *f) * dt / carried;
+        pressed += unit * (before + *f);
         before = *f;
         let mut limit = c.mu0 * (*f + c.attraction.at(*f));
         if c.load_exponent != 0.0 {

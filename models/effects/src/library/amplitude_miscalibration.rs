@@ -12,7 +12,8 @@ const MOST_E_FOLDS: f64 = 2.0;
 pub(super) static EFFECT: Effect = Effect {
     name: "amplitude_miscalibration",
     place: Location::Plate,
-    summary: "True amplitude is a factor, which may follow frequency and amplitude, or a dead zone away from the commanded one.",
+    summary: "True amplitude is a factor, which may follow frequency and amplitude, or a dead zone away from \
+              the commanded one.",
     source: "vibrometer calibrations of drives; confusion of peak and peak-to-peak is a factor of two",
     laws: &[
         Law::new("gain", &[Parameter::signed("log_gain", "1", 0.3, -1.5, 1.5)])
