@@ -129,7 +129,7 @@ fn predicted(table: &str, held: impl Fn(usize, usize) -> bool, what: &str) -> He
     let origin = Table::measured(&kept).unwrap().origin(&kept);
     let conditions = Table::conditions(&hidden, &origin).unwrap();
     let (mut before, mut after, mut inside) = (0.0, 0.0, 0.0);
-    for (point, forecast) in conditions.points.iter().zip(result.predict(&conditions)) {
+    for (point, forecast) in conditions.points.iter().zip(result.predict(&conditions).unwrap()) {
         let force = hidden.iter().find(|p| p.point == *point).unwrap().lateral_force_n.unwrap();
         before += ((forecast.baseline - force) / force).powi(2);
         after += ((forecast.in_run - force) / force).powi(2);

@@ -306,7 +306,13 @@ mod tests {
             let sum: f64 = result.report.hypotheses.iter().map(|h| h.probability).sum();
             assert!((sum - 1.0).abs() < 1e-9, "{sum}");
             assert_eq!(result.saved_model().is_some(), wanted == Verdict::NoGap);
-            assert!(result.predict(&table).iter().all(|f| f.corrected.is_finite() && f.corrected_sd > 0.0));
+            assert!(
+                result
+                    .predict(&table)
+                    .unwrap()
+                    .iter()
+                    .all(|f| f.corrected.is_finite() && f.corrected_sd > 0.0)
+            );
         }
     }
 

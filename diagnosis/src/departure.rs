@@ -64,6 +64,11 @@ impl Kernels {
         Kernels { largest_amplitude: largest, smooth, bends, coordinates }
     }
 
+    /// Temperature and humidity, where the smooth functions go over them.
+    pub fn climate(&self) -> impl Iterator<Item = &'static Covariate> + '_ {
+        self.coordinates.climate()
+    }
+
     /// Their bases at passes.
     pub fn at(&self, passes: &[Condition]) -> Basis {
         self.of(passes, |_| true)

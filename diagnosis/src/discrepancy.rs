@@ -27,7 +27,7 @@ pub fn lengths(k: &Constants, table: &Table) -> Vec<Lengths> {
         seen: [true; COUNT],
     });
     let coordinates = Coordinates::of(table);
-    let (sees, alone) = (coordinates.sees_climate(), k.discrepancy_lengths[0]);
+    let (sees, alone) = (coordinates.climate().next().is_some(), k.discrepancy_lengths[0]);
     let each = coordinates.varying().map(|only| Lengths {
         condition: alone,
         time: alone,

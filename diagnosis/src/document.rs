@@ -2,6 +2,7 @@
 
 use crate::certificates;
 use crate::data::Table;
+use crate::unstated::Unstated;
 use crate::verdict::Diagnosis;
 use models::rig_file::RigFile;
 
@@ -26,12 +27,15 @@ pub fn document(result: &Diagnosis, rig: &RigFile, damage: &[String]) -> serde_j
 }
 
 /// What `--predictions` holds: CSV, a row a condition; empty cells where the base law cannot tell.
-pub fn predictions(result: &Diagnosis, conditions: &Table) -> String {
+///
+/// # Errors
+/// A condition that lacks a column by which the verdict's model predicts.
+pub fn predictions(result: &Diagnosis, conditions: &Table) -> Result<String, Unstated> {
     let mut text = String::from(
         "point,lateral_force_baseline_n,lateral_force_corrected_n,lateral_force_corrected_sd_n,\
          lateral_force_in_run_n,lateral_force_in_run_sd_n\n",
     );
-    for (point, f) in conditions.points.iter().zip(result.predict(conditions)) {
+    for (point, f) in conditions.points.iter().zip(result.predict(conditions)?) {
         let cells = if f.baseline.is_nan() {
             ",,,,".to_string()
         } else {
@@ -40,5 +44,5 @@ pub fn predictions(result: &Diagnosis, conditions: &Table) -> String {
         };
         text.push_str(&format!("{point},{cells}\n"));
     }
-    text
+    Ok(text)
 }

@@ -3,7 +3,7 @@
 use crate::constants::Constants;
 use crate::data::Table;
 use models::condition::Condition;
-use models::covariate::{Role, SMOOTH};
+use models::covariate::{Covariate, Role, SMOOTH};
 use nalgebra::{DMatrix, DVector};
 
 /// Which covariates a kernel sees, each kind with its length in standard deviations; an infinite one leaves
@@ -89,9 +89,10 @@ impl Coordinates {
         Self { mean, sd }
     }
 
-    /// Whether temperature or humidity changes in a way that time does not tell.
-    pub fn sees_climate(&self) -> bool {
-        SMOOTH.iter().zip(&self.sd).any(|(c, sd)| c.role == Role::Climate && *sd > 0.0)
+    /// Temperature and humidity, where they change in a way that time does not tell.
+    pub fn climate(&self) -> impl Iterator<Item = &'static Covariate> + '_ {
+        let all = SMOOTH.iter().zip(&self.sd);
+        all.filter(|(c, sd)| c.role == Role::Climate && **sd > 0.0).map(|(c, _)| *c)
     }
 
     /// Settings that the table changes.

@@ -88,6 +88,7 @@ pub mod singles;
 pub mod starts;
 pub mod structure;
 pub mod timing;
+pub mod unstated;
 pub mod verdict;
 
 pub use decision::Verdict;

@@ -39,7 +39,7 @@ pub struct Forecast {
 
 /// A hypothesis that predicts.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
-enum Which {
+pub(crate) enum Which {
     Baseline,
     Cause(usize),
     Open,
@@ -62,6 +62,11 @@ impl Answer {
     /// One cause or pair, by its place among the candidates.
     pub fn cause(candidate: usize) -> Self {
         Answer { parts: vec![(1.0, Which::Cause(candidate))], leader: Some(candidate) }
+    }
+
+    /// The hypotheses that it predicts by.
+    pub(crate) fn hypotheses(&self) -> impl Iterator<Item = Which> + '_ {
+        self.parts.iter().map(|(_, which)| *which)
     }
 
     /// Of a verdict: `no_gap` predicts by the baseline and `named` by what is named. Under `ambiguous` and

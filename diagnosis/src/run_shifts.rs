@@ -81,7 +81,7 @@ mod tests {
         }
         let result = diagnose(&table, &rig(), &Options::default(), String::new());
         assert_eq!(result.report.verdict, Verdict::NoGap, "{}", result.report.text);
-        let forecasts = result.predict(&table);
+        let forecasts = result.predict(&table).unwrap();
         let mut missed = [0.0; 2];
         for (i, f) in forecasts.iter().enumerate() {
             assert_eq!(f.corrected, f.recalibrated);

@@ -18,6 +18,7 @@ use crate::run_shifts::shifted;
 use crate::scatter::Scatter;
 use crate::shrinkage::{Gap, gap};
 use crate::timing::{Comparison, RecordPart};
+use crate::unstated::{Unstated, unstated};
 use effects::{Effect, Need, imitated};
 use models::condition::Condition;
 use models::reading_evidence::ReadingFinding;
@@ -424,12 +425,18 @@ impl Diagnosis {
 
     /// Predicts conditions with the verdict's model; those in runs that the table does not have, or after its
     /// end, with the deviations that such passes of the table needed.
-    pub fn predict(&self, conditions: &Table) -> Vec<Forecast> {
+    ///
+    /// # Errors
+    /// A condition that lacks a column by which that model predicts.
+    pub fn predict(&self, conditions: &Table) -> Result<Vec<Forecast>, Unstated> {
         let answer = self.answer();
+        if let Some(why) = unstated(&self.fitted, &answer, conditions) {
+            return Err(why);
+        }
         let whole = model(&self.fitted, &self.table, &answer, None);
         let mut plain = forecast(&self.fitted, &self.rig, &whole, &conditions.passes);
         let own = forecast(&self.fitted, &self.rig, &whole, &self.table.passes);
         shifted(&self.fitted, &self.table, &own, conditions, &mut plain);
-        widened(&self.fitted, &self.table, &self.rig, &answer, conditions, plain)
+        Ok(widened(&self.fitted, &self.table, &self.rig, &answer, conditions, plain))
     }
 }

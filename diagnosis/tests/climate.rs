@@ -61,7 +61,7 @@ fn passes(temperature: fn(f64, f64) -> f64) -> Vec<Pass> {
 fn a_cause_that_goes_with_temperature_is_predicted_by_temperature() {
     let passes = passes(|_, any| 6.0 * any);
     let table = Table::measured(&passes).unwrap();
-    assert!(Coordinates::of(&table).sees_climate());
+    assert!(Coordinates::of(&table).climate().next().is_some());
     let rig = RigFile::parse(RIG).unwrap();
     let options = Options { pairs: false, ..Options::default() };
     let found = diagnose(&table, &rig, &options, String::new());
@@ -70,13 +70,24 @@ fn a_cause_that_goes_with_temperature_is_predicted_by_temperature() {
     // On held-out passes, whose neighbours in time had other temperatures.
     let closed = gap.shrinkage.unwrap();
     assert!(closed > 0.5, "{closed:.2}: {gap:?}");
+
+    // A condition without a temperature is none that the map can predict: it does not get the mean one.
+    let mut wanted = passes[..20].to_vec();
+    let conditions = |rows: &[Pass]| Table::conditions(rows, &table.origin(&passes)).unwrap();
+    assert_eq!(found.predict(&conditions(&wanted)).unwrap().len(), 20);
+    wanted[7].temperature_c = None;
+    let why = found.predict(&conditions(&wanted)).unwrap_err();
+    assert_eq!((why.point, why.column), (wanted[7].point, "temperature_c"), "{why}");
+    let reduced: Vec<Pass> = passes.iter().cloned().map(|p| Pass { temperature_c: None, ..p }).collect();
+    let blind = diagnose(&Table::measured(&reduced).unwrap(), &rig, &options, String::new());
+    assert!(blind.predict(&conditions(&wanted)).is_ok(), "a map without temperature asks for none");
 }
 
 /// A room that warms with the hour says nothing that time does not say.
 #[test]
 fn temperature_that_goes_with_time_is_time() {
     let table = Table::measured(&passes(|time, any| 6.0 * time * (2.0 - time) + 0.05 * any)).unwrap();
-    assert!(!Coordinates::of(&table).sees_climate());
+    assert!(!Coordinates::of(&table).climate().next().is_some());
     let swinging = Table::measured(&passes(|time, _| 3.0 * (8.0 * PI * time).sin())).unwrap();
-    assert!(Coordinates::of(&swinging).sees_climate());
+    assert!(Coordinates::of(&swinging).climate().next().is_some());
 }

@@ -1,9 +1,11 @@
 //! Causes in a formula that the library does not have, by tests/peers/third_generator.py (`--seed 36113007`
 //! unless said), which marches a spring-slider over the cycle and shares no code with this project.
 
+use models::pass::{Pass, read_passes};
 use models::rig_file::RigFile;
 use muprime_diagnosis::data::Table;
 use muprime_diagnosis::decision::Verdict;
+use muprime_diagnosis::document::predictions;
 use muprime_diagnosis::hypotheses::Options;
 use muprime_diagnosis::verdict::{Report, diagnose};
 use rayon::prelude::*;
@@ -47,6 +49,22 @@ fn a_jump_is_no_cause_whose_function_bends_to_it() {
     assert_ne!(verdict, Verdict::Named, "{text}");
 }
 
+/// Menisci pull by the humidity: a condition that does not state one is refused, with the law and the column.
+#[test]
+fn a_law_of_humidity_predicts_no_condition_without_one() {
+    let passes = passes("adhesion");
+    let table = Table::measured(&passes).unwrap();
+    let rig = RigFile::parse(&text("adhesion", "rig.toml")).unwrap();
+    let result = diagnose(&table, &rig, &Options::default(), String::new());
+    let without: Vec<Pass> =
+        passes.iter().cloned().map(|p| Pass { relative_humidity_pct: None, ..p }).collect();
+    let conditions = Table::conditions(&without, &table.origin(&passes)).unwrap();
+    let why = predictions(&result, &conditions).unwrap_err();
+    assert_eq!((why.point, why.column), (passes[0].point, "relative_humidity_pct"));
+    assert!(why.by.starts_with("adhesion by its law"), "{why}");
+    assert!(predictions(&result, &table).is_ok());
+}
+
 /// A cause that is left out of the library does not come back in the place of its exact alias in a pair.
 #[test]
 fn what_is_left_out_is_no_member_of_a_pair() {
@@ -75,10 +93,17 @@ fn diagnosed(set: &str) -> (Verdict, String, Vec<String>) {
 }
 
 fn report(set: &str, options: &Options) -> Report {
-    let folder = Path::new(env!("CARGO_MANIFEST_DIR")).join("tests/forms").join(set);
-    let text = |name: &str| std::fs::read_to_string(folder.join(name)).unwrap();
-    let passes = models::pass::read_passes(text("train.csv").as_bytes()).unwrap();
+    let passes = passes(set);
     let table = Table::measured(&passes).unwrap();
-    let rig = RigFile::parse(&text("rig.toml")).unwrap();
+    let rig = RigFile::parse(&text(set, "rig.toml")).unwrap();
     diagnose(&table, &rig, options, String::new()).report
+}
+
+fn passes(set: &str) -> Vec<Pass> {
+    read_passes(text(set, "train.csv").as_bytes()).unwrap()
+}
+
+fn text(set: &str, name: &str) -> String {
+    let folder = Path::new(env!("CARGO_MANIFEST_DIR")).join("tests/forms").join(set);
+    std::fs::read_to_string(folder.join(name)).unwrap()
 }

@@ -80,7 +80,8 @@ fn texts(
     let conditions = conditions.transpose().wrap_err("conditions to predict")?;
     let result = subject.diagnose(choice, run)?;
     let page = subject.page_of_table(&result, name, rig_name)?;
-    let predicted = conditions.as_ref().map(|conditions| predictions(&result, conditions));
+    let predicted = conditions.as_ref().map(|conditions| predictions(&result, conditions)).transpose();
+    let predicted = predicted.into_diagnostic().wrap_err("conditions to predict")?;
     let (model, rig) = (corrected_model(&result)?, &subject.rig);
     Ok((document(&result, rig, damage).into_diagnostic()?, words(&result, rig), page, predicted, model))
 }

@@ -106,7 +106,7 @@ fn score(folder: &Path, options: &Options, changes: &[Constants]) -> Result<Line
     let conditions = Table::conditions(&hidden, &table.origin(&passes))?;
     let start = Instant::now();
     let mut result = diagnose(&table, &rig, options, String::new());
-    let forecasts = result.predict(&conditions);
+    let forecasts = result.predict(&conditions)?;
     let seconds = start.elapsed().as_secs_f64();
     let as_fitted = result.fitted.candidates.clone();
     let changed = changes

@@ -200,7 +200,7 @@ fn viewers_that_do_not_read_hold_nobody_up() {
     let served = Served::start(&runs, &[]);
     let reader = |stream| read_all(stream, 1 << 16, Duration::ZERO);
     let readers: Vec<_> = (0..6).map(|_| reader(served.stream("live"))).collect();
-    let slow = read_all(with_room(served.stream("live"), 1 << 15), 1 << 10, CLOCK / 2);
+    let slow = read_all(with_room(served.stream("live"), 1 << 15), 1 << 12, CLOCK / 2);
     let mut deaf = with_room(served.stream("live"), 1);
     std::thread::sleep(Duration::from_secs(seconds / 4));
     let before = resident_bytes(served.process.id()).unwrap();

@@ -100,7 +100,9 @@ pub fn run(args: Args, json: bool) -> miette::Result<ExitCode> {
     let result = subject.diagnose(Options { progress, ..options }, run)?;
     bar.finish_and_clear();
     if let (Some(conditions), Some(out)) = (&conditions, &args.predictions) {
-        write_text(out, &predictions(&result, conditions))?;
+        let shown = || args.predict.as_ref().map_or_else(String::new, |path| path.display().to_string());
+        let text = predictions(&result, conditions).into_diagnostic().wrap_err_with(shown)?;
+        write_text(out, &text)?;
     }
     save_next(&args, &result)?;
     if args.report.is_some() || args.in_folder {

@@ -81,7 +81,7 @@ mod tests {
         assert!(result.report.text.contains("with the first shape described"), "{}", result.report.text);
         let held = whole.select(&held);
         let mut errors = [0.0; 2];
-        for (i, f) in result.predict(&held).iter().enumerate() {
+        for (i, f) in result.predict(&held).unwrap().iter().enumerate() {
             errors[0] += (held.lateral[i] - f.recalibrated).powi(2);
             errors[1] += (held.lateral[i] - f.corrected).powi(2);
         }

@@ -21,6 +21,7 @@ use diagnosis::describe::probability;
 use diagnosis::left_out::Errors;
 use diagnosis::predict::Forecast;
 use diagnosis::verdict::Diagnosis;
+use miette::IntoDiagnostic;
 use models::covariate;
 
 /// Parts of the operating space that the page lists, the largest first.
@@ -29,7 +30,7 @@ const LISTED_REGIONS: usize = 3;
 /// The page; `about` is what is known of the table's run, and stands first.
 pub fn page(result: &Diagnosis, table: &Table, about: &[(&str, String)]) -> miette::Result<String> {
     let r = &result.report;
-    let forecasts = result.predict(table);
+    let forecasts = result.predict(table).into_diagnostic()?;
     let overlay = overlay::Overlay::new(result, table, &forecasts);
     let departed = r.verdict != Verdict::NoGap;
     let body = [

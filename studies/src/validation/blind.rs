@@ -12,6 +12,7 @@ use diagnosis::constants::Constants;
 use diagnosis::data::{RigFile, Table};
 use diagnosis::hypotheses::Options;
 use diagnosis::verdict::diagnose;
+use miette::IntoDiagnostic;
 use models::covariate;
 use reliability::{Entry, identifiable};
 use serde::{Deserialize, Serialize};
@@ -135,7 +136,7 @@ pub fn score(set: &Set, options: &Options) -> miette::Result<Scored> {
     let conditions = Table::conditions(&set.conditions, &table.origin(&set.passes))
         .map_err(|e| miette::miette!("conditions of a sealed set: {e}"))?;
     let result = diagnose(&table, &rig, options, String::new());
-    let forecasts = result.predict(&conditions);
+    let forecasts = result.predict(&conditions).into_diagnostic()?;
     let report = &result.report;
 
     // Only from here on are label and truth open.
