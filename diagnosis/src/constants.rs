@@ -140,7 +140,7 @@ constants! {
     slow_modes: usize = 80, "Cosines of its slow part, at most a third as many as passes.", "numerical: beyond them a correlation of 0.9 is nearly independent";
 
     form_shares: [f64; 3] = [0.05, 0.15, 0.35], "Standard deviation of a cause's departure from its form, as a share of its net change.", "development: true causes under another formula left 13 to 49 % of their gap";
-    form_weights: [f64; 4] = [0.4, 0.4, 0.2, 0.4], "Prior weights of those shares, and of what a cause acts on bent by `bend_share`.", JUDGEMENT;
+    form_weights: [f64; 5] = [0.4, 0.4, 0.2, 0.4, 0.1], "Prior weights of those shares, and of what a cause acts on, and of its size, bent by `bend_share`.", JUDGEMENT;
     bend_share: f64 = 0.7, "Standard deviation by which what a cause acts on may depart from its law, as a share of its net change.", JUDGEMENT;
     bend_length: f64 = 1.0, "Correlation length of it over the covariates of the cause's mechanism, in standard deviations of each.", "development: with 0.6, 1 and 1.5 29, 30 and 30 of 49 causes named right, 2, 1 and 1 wrong";
     bend_place_length: f64 = 0.3, "The same over the place on the plate.", JUDGEMENT;
@@ -163,7 +163,7 @@ constants! {
     hopeless: [f64; 2] = [1.5, 60.0], "Factor on the best tempered cost, and offset in chi2, beyond which a law is not refined.", NUMERICAL;
     pairs_from_nats: f64 = 3.0, "Nats by which the best single cause must beat no gap before pairs are tried.", NUMERICAL;
     misfit_sd: f64 = 2.5, "Deviations of chi2 above its mean from which the best single cause is taken to leave something.", NUMERICAL;
-    pair_seeds: usize = 6, "Single causes from which pairs are grown.", NUMERICAL;
+    pair_seeds: usize = 6, "Single causes from which pairs are grown, and of which the size is tried as a function of the place and the weather.", NUMERICAL;
     pairs_fitted: usize = 20, "Pairs that are fitted in full.", NUMERICAL;
     pairs_searched: usize = 4, "Pairs that are sought again in each two laws.", NUMERICAL;
     laws_refined: usize = 16, "Laws of those pairs that are followed.", NUMERICAL;

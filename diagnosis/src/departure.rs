@@ -6,30 +6,46 @@
 
 use crate::constants::Constants;
 use crate::fit::Problem;
-use crate::kernel::{Coordinates, Kernel, Lengths, form_lengths};
+use crate::kernel::{COUNT, Coordinates, Kernel, Lengths, form_lengths};
 use crate::layout::{Layout, NUISANCES};
 use crate::member::Member;
 use crate::recalibration::Recalibration;
+use effects::Input;
 use models::condition::Condition;
-use models::covariate::{Covariate, Role, SMOOTH};
+use models::covariate::{Covariate, Role, SMOOTH, TIME};
 use nalgebra::{DMatrix, DVector};
+
+/// Correlation length over the starts of runs, in standard deviations of time.
+const RUN_LENGTH: f64 = 0.02;
 
 /// Standard deviations of the departures, as shares of the cause's change net of recalibration.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Freedom {
     /// Of the change itself, over all covariates.
     pub share: f64,
-    /// Of what the cause acts on, over the covariates of its mechanism.
+    /// Of what is bent.
     pub bend: f64,
+    /// What that is.
+    pub bends: Bends,
+}
+
+/// What a cause's function replaces.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum Bends {
+    /// What the cause acts on, over the covariates of its mechanism ([`effects::Acts`]).
+    Input,
+    /// Its size, over the weather and, where no other effect is that, over the place: a stiffness that is
+    /// another along the plate, a damping that falls as it warms.
+    Size,
 }
 
 impl Freedom {
     /// None: the library's form, or no cause.
-    pub const NONE: Freedom = Freedom { share: 0.0, bend: 0.0 };
+    pub const NONE: Freedom = Freedom::share(0.0);
 
     /// Of the change alone.
     pub const fn share(share: f64) -> Self {
-        Freedom { share, bend: 0.0 }
+        Freedom { share, bend: 0.0, bends: Bends::Input }
     }
 }
 
@@ -40,7 +56,31 @@ pub struct Kernels {
     largest_amplitude: f64,
     smooth: (Lengths, Kernel),
     /// By effect; without those whose covariates do not change in the table.
-    bends: Vec<(usize, Lengths, Kernel)>,
+    bends: Vec<Bend>,
+    /// Over the weather, and over the place too; none where these do not change.
+    sizes: [Option<(Lengths, Kernel)>; 2],
+}
+
+/// A smooth function that bends what an effect acts on.
+#[derive(Debug, Clone)]
+struct Bend {
+    effect: usize,
+    /// Whether it goes over the start of the run, each run apart, in the place of time.
+    by_run: bool,
+    lengths: Lengths,
+    kernel: Kernel,
+}
+
+impl Bend {
+    fn place(&self, coordinates: &Coordinates, p: &Condition, largest_amplitude: f64) -> [f64; COUNT] {
+        coordinates.place(&at_start(p, self.by_run), largest_amplitude, &self.lengths)
+    }
+}
+
+/// The condition at the start of its run.
+fn at_start(p: &Condition, by_run: bool) -> Condition {
+    let since = if by_run { p.time_in_run_s() } else { 0.0 };
+    Condition { time_s: p.time_s - since, ..*p }
 }
 
 impl Kernels {
@@ -48,20 +88,29 @@ impl Kernels {
     pub fn on(problem: &Problem, coordinates: Coordinates, effects: &[usize]) -> Self {
         let k = &problem.constants;
         let largest = problem.design.largest_amplitude_m;
-        let kernel = |lengths: &Lengths| {
-            let place = |p: &Condition| coordinates.place(p, largest, lengths);
+        let kernel = |lengths: &Lengths, by_run: bool| {
+            let place = |p: &Condition| coordinates.place(&at_start(p, by_run), largest, lengths);
             let places: Vec<_> = problem.passes.iter().map(place).collect();
             Kernel::new(&places, k.form_rank, k.kernel_rest)
         };
         let smooth = form_lengths(k);
-        let smooth = (smooth, kernel(&smooth));
-        let bends = effects.iter().filter_map(|&effect| {
-            let lengths = bend_lengths(k, effects::at(effect).acts?.over);
-            let kernel = kernel(&lengths);
-            (kernel.rank() > 1).then_some((effect, lengths, kernel))
+        let smooth = (smooth, kernel(&smooth, false));
+        let bends = effects.iter().filter_map(|&effect| Some((effect, effects::at(effect).acts?)));
+        let bends = bends.flat_map(|(effect, acts)| {
+            let over = (false, bend_lengths(k, acts.over));
+            let runs = acts.by_run().then(|| (true, run_lengths(k)));
+            [Some(over), runs].into_iter().flatten().map(move |(by_run, lengths)| (effect, by_run, lengths))
         });
-        let bends = bends.collect();
-        Kernels { largest_amplitude: largest, smooth, bends, coordinates }
+        let bends = bends.map(|(effect, by_run, lengths)| {
+            let kernel = kernel(&lengths, by_run);
+            Bend { effect, by_run, lengths, kernel }
+        });
+        let bends = bends.filter(|bend| bend.kernel.rank() > 1).collect();
+        let sizes = [false, true].map(|place| {
+            let lengths = size_lengths(k, place);
+            Some((lengths, kernel(&lengths, false))).filter(|(_, kernel)| kernel.rank() > 1)
+        });
+        Kernels { largest_amplitude: largest, smooth, bends, sizes, coordinates }
     }
 
     /// Temperature and humidity, where the smooth functions go over them.
@@ -80,15 +129,53 @@ impl Kernels {
     }
 
     fn of(&self, passes: &[Condition], needed: impl Fn(usize) -> bool) -> Basis {
-        let basis = |(lengths, kernel): (&Lengths, &Kernel)| {
+        let basis = |(lengths, kernel): &(Lengths, Kernel)| {
             let place = |p: &Condition| self.coordinates.place(p, self.largest_amplitude, lengths);
             kernel.matrix(&passes.iter().map(place).collect::<Vec<_>>())
         };
-        let (lengths, kernel) = &self.smooth;
-        let needed = self.bends.iter().filter(|(effect, ..)| needed(*effect));
-        let bends = needed.map(|(effect, lengths, kernel)| (*effect, basis((lengths, kernel))));
-        Basis { smooth: basis((lengths, kernel)), bends: bends.collect() }
+        let mut bends: Vec<(usize, DMatrix<f64>)> = Vec::new();
+        for bend in self.bends.iter().filter(|bend| needed(bend.effect)) {
+            let place = |p: &Condition| bend.place(&self.coordinates, p, self.largest_amplitude);
+            let columns = bend.kernel.matrix(&passes.iter().map(place).collect::<Vec<_>>());
+            match bends.last_mut() {
+                // The functions add.
+                Some((effect, all)) if *effect == bend.effect => {
+                    *all = beside_each_other(std::mem::take(all), &columns);
+                }
+                _ => bends.push((bend.effect, columns)),
+            }
+        }
+        Basis {
+            smooth: basis(&self.smooth),
+            bends,
+            sizes: self.sizes.each_ref().map(|of| of.as_ref().map(basis)),
+        }
     }
+}
+
+/// The columns of one function and of another: the functions add.
+fn beside_each_other(first: DMatrix<f64>, other: &DMatrix<f64>) -> DMatrix<f64> {
+    let (before, more) = (first.ncols(), other.ncols());
+    let mut all = first.resize_horizontally(before + more, 0.0);
+    all.columns_mut(before, more).copy_from(other);
+    all
+}
+
+/// Over the starts of the runs, so short that each run is apart.
+fn run_lengths(k: &Constants) -> Lengths {
+    Lengths { time: RUN_LENGTH, ..bend_lengths(k, &[&TIME]) }
+}
+
+/// Over the weather, and over the place too, as smooth as a departure from form.
+fn size_lengths(k: &Constants, place: bool) -> Lengths {
+    let (far, climate) = (f64::INFINITY, k.form_length);
+    let position = if place { climate } else { far };
+    Lengths { condition: far, time: far, position, climate, seen: [true; COUNT] }
+}
+
+/// Whether the size of an effect may go with the place: not where another effect of the library is that.
+fn goes_with_place(effect: usize) -> bool {
+    !effects::at(effect).acts.is_some_and(|acts| matches!(acts.on, Input::Amplitude | Input::Speed))
 }
 
 fn bend_lengths(k: &Constants, over: &[&Covariate]) -> Lengths {
@@ -108,27 +195,37 @@ pub struct Basis {
     /// Over all covariates: a row a pass.
     pub smooth: DMatrix<f64>,
     bends: Vec<(usize, DMatrix<f64>)>,
+    /// Over the weather, and over the place too.
+    sizes: [Option<DMatrix<f64>>; 2],
 }
 
 impl Basis {
     /// Of no departure.
     pub fn none(passes: usize) -> Self {
-        Basis { smooth: DMatrix::zeros(passes, 0), bends: Vec::new() }
+        Basis { smooth: DMatrix::zeros(passes, 0), bends: Vec::new(), sizes: [None, None] }
     }
 
     /// Of some of the passes.
     pub fn select(&self, rows: &[usize]) -> Self {
         let of = |m: &DMatrix<f64>| m.select_rows(rows.iter());
-        Basis { smooth: of(&self.smooth), bends: self.bends.iter().map(|(e, m)| (*e, of(m))).collect() }
+        let bends = self.bends.iter().map(|(e, m)| (*e, of(m))).collect();
+        Basis {
+            smooth: of(&self.smooth),
+            bends,
+            sizes: self.sizes.each_ref().map(|sizes| sizes.as_ref().map(of)),
+        }
     }
 
-    fn of(&self, effect: usize) -> Option<&DMatrix<f64>> {
-        self.bends.iter().find(|(e, _)| *e == effect).map(|(_, basis)| basis)
+    fn of(&self, effect: usize, bends: Bends) -> Option<&DMatrix<f64>> {
+        match bends {
+            Bends::Input => self.bends.iter().find(|(e, _)| *e == effect).map(|(_, basis)| basis),
+            Bends::Size => self.sizes[usize::from(goes_with_place(effect))].as_ref(),
+        }
     }
 
-    /// Whether a member of a hypothesis can be bent.
-    pub fn bends(&self, members: &[Member]) -> bool {
-        members.iter().any(|m| self.of(m.effect).is_some())
+    /// Whether a member of a hypothesis can be bent so.
+    pub fn bends(&self, members: &[Member], bends: Bends) -> bool {
+        members.iter().any(|m| self.of(m.effect, bends).is_some())
     }
 }
 
@@ -145,7 +242,8 @@ pub struct Change {
 #[derive(Debug, Clone)]
 pub struct Bent {
     effect: usize,
-    /// Standard deviation, in the unit of its input.
+    bends: Bends,
+    /// Standard deviation, in the unit of its input, or in the coordinate of the size.
     sd: f64,
     /// One standard deviation, N.
     force: DVector<f64>,
@@ -175,18 +273,16 @@ impl Change {
         let Recalibration { raw, jacobian, .. } = recalibrated;
         let mut bent = Vec::new();
         for (i, member) in members.iter().enumerate().filter(|_| freedom.bend > 0.0) {
-            let (Some(acts), Some(_)) = (effects::at(member.effect).acts, basis.of(member.effect)) else {
-                continue;
-            };
+            let slope = slope(problem, members, u, prediction, (i, freedom.bends));
+            let (Some(slope), Some(_)) = (slope, basis.of(member.effect, freedom.bends)) else { continue };
             let own = match members.len() {
                 1 => raw.clone(),
                 _ => prediction - without(problem, members, u, i),
             };
             let own = beside_recalibration(problem, &jacobian, &own);
-            let slope = problem.sensitivity(members, u, prediction, acts.on);
             let unit = norm(problem, &beside_recalibration(problem, &jacobian, &slope));
             let sd = freedom.bend * norm(problem, &own) / unit.max(1e-300);
-            bent.push(Bent { effect: member.effect, sd, force: slope * sd });
+            bent.push(Bent { effect: member.effect, bends: freedom.bends, sd, force: slope * sd });
         }
         Change { net, bent }
     }
@@ -204,7 +300,8 @@ impl Change {
         let under = out.predict(&[], &u[..NUISANCES]);
         let net = plain - &under - out.jacobian(&[], &u[..NUISANCES], &under) * shift;
         let bent = self.bent.iter().filter_map(|bent| {
-            let slope = out.sensitivity(members, u, plain, effects::at(bent.effect).acts?.on);
+            let i = members.iter().position(|m| m.effect == bent.effect)?;
+            let slope = slope(out, members, u, plain, (i, bent.bends))?;
             Some(Bent { force: slope * bent.sd, ..*bent })
         });
         Change { net, bent: bent.collect() }
@@ -217,14 +314,22 @@ impl Change {
 
     /// Whether something is bent over this covariate.
     pub fn bends_over(&self, covariate: &Covariate) -> bool {
-        let over = |b: &Bent| effects::at(b.effect).acts.map_or(&[][..], |acts| acts.over);
-        self.bent.iter().any(|b| over(b).iter().any(|c| c.name == covariate.name))
+        self.bent.iter().any(|b| match b.bends {
+            Bends::Input => effects::at(b.effect)
+                .acts
+                .is_some_and(|acts| acts.over.iter().any(|c| c.name == covariate.name)),
+            Bends::Size => match covariate.role {
+                Role::Place => goes_with_place(b.effect),
+                role => role == Role::Climate,
+            },
+        })
     }
 
     /// Columns of the departure, N: independent standard deviates times these. What is bent comes first.
     pub fn columns(&self, basis: &Basis, share: f64) -> DMatrix<f64> {
         let smooth = (share > 0.0).then_some((&basis.smooth, &self.net, share));
-        let bent = self.bent.iter().filter_map(|bent| Some((basis.of(bent.effect)?, &bent.force, 1.0)));
+        let bent =
+            self.bent.iter().filter_map(|bent| Some((basis.of(bent.effect, bent.bends)?, &bent.force, 1.0)));
         let parts: Vec<_> = bent.chain(smooth).collect();
         let mut all = DMatrix::zeros(self.net.len(), parts.iter().map(|(m, ..)| m.ncols()).sum());
         let mut at = 0;
@@ -236,6 +341,22 @@ impl Change {
         }
         all
     }
+}
+
+/// Change of the predictions for a unit of what is bent of a member.
+fn slope(
+    problem: &Problem,
+    members: &[Member],
+    u: &[f64],
+    prediction: &DVector<f64>,
+    (member, bends): (usize, Bends),
+) -> Option<DVector<f64>> {
+    Some(match bends {
+        Bends::Input => {
+            problem.sensitivity(members, u, prediction, effects::at(members[member].effect).acts?.on)
+        }
+        Bends::Size => problem.size_sensitivity(members, u, prediction, member),
+    })
 }
 
 fn without(problem: &Problem, members: &[Member], u: &[f64], member: usize) -> DVector<f64> {
@@ -309,7 +430,8 @@ mod tests {
         let fit = minimise(&problem, &members, &start, &problem.variance, 15);
         let large = Freedom::share(problem.constants.form_shares[2]);
         let alone = laplace(&problem, &members, &fit.u, &basis, large, 6);
-        let bent = Freedom { share: problem.constants.form_shares[1], bend: problem.constants.bend_share };
+        let share = Freedom::share(problem.constants.form_shares[1]);
+        let bent = Freedom { bend: problem.constants.bend_share, ..share };
         let bent = laplace(&problem, &members, &fit.u, &basis, bent, 6);
         let gained = bent.log_evidence - alone.log_evidence;
         assert!(gained > 3.0, "{gained:.1} nats");

@@ -10,6 +10,7 @@ use crate::gaussian::{Covariance, HALF_LN_2PI, Scaled, log_sum_exp};
 use crate::kernel::{COUNT, Coordinates, Kernel, Lengths};
 use crate::layout::NUISANCES;
 use models::condition::Condition;
+use models::covariate::Covariate;
 use nalgebra::{DMatrix, DVector};
 use rayon::prelude::*;
 
@@ -216,6 +217,11 @@ impl Discrepancy {
     /// Where it has the nuisances, in their prior deviations.
     pub fn nuisances(&self) -> &[f64] {
         &self.weights.as_slice()[2 * self.kernel.rank()..]
+    }
+
+    /// Temperature and humidity, where it goes over them.
+    pub fn climate(&self) -> impl Iterator<Item = &'static Covariate> + '_ {
+        self.coordinates.climate().filter(|_| self.lengths.climate.is_finite())
     }
 
     /// Expected lateral forces at other conditions (N), the rows of the smooth part there, and the sizes on

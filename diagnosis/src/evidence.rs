@@ -5,7 +5,7 @@
 //! The integral over the parameters is Laplace's, with the half-line of a size that cannot be negative.
 
 use crate::constants::Constants;
-use crate::departure::{Basis, Change, Freedom};
+use crate::departure::{Basis, Bends, Change, Freedom};
 use crate::fit::{Member, Problem};
 use crate::gaussian::{Covariance, HALF_LN_2PI, log_sum_exp};
 use crate::layout::{Layout, NUISANCES};
@@ -239,14 +239,18 @@ pub fn averaged_over_form(
     let [first, second, third] = MODE_ROUNDS;
     let middle = laplace(problem, members, &fit.u, basis, middle_freedom(k, members), second);
     let from = |freedom: Freedom, rounds: usize| laplace(problem, members, &middle.u, basis, freedom, rounds);
-    let [one, two, three, four] = k.form_weights;
+    let [one, two, three, four, five] = k.form_weights;
     let mut list = vec![(from(Freedom::share(small), first), one)];
     if most >= large {
         list.push((from(Freedom::share(large), third), three));
     }
-    if basis.bends(members) {
-        let bent = Freedom { share: middle.freedom.share, bend: k.bend_share };
-        list.push((from(bent, second), four));
+    // Of two causes either's size may hide what the other does.
+    let sizes = (members.len() == 1).then_some((Bends::Size, five));
+    for (bends, weight) in [(Bends::Input, four)].into_iter().chain(sizes) {
+        if basis.bends(members, bends) {
+            let bent = Freedom { share: middle.freedom.share, bend: k.bend_share, bends };
+            list.push((from(bent, second), weight));
+        }
     }
     if most >= medium {
         list.push((middle, two));
@@ -301,7 +305,7 @@ mod tests {
                         });
                     }
                     let k = &problem.constants;
-                    let freedom = Freedom { share: k.form_shares[1], bend: k.bend_share };
+                    let freedom = Freedom { bend: k.bend_share, ..Freedom::share(k.form_shares[1]) };
                     let with = laplace(&problem, &[member], &u, &basis, freedom, 0);
                     let gain = with.log_evidence - none.log_evidence;
                     let name = (effects::library()[effect].name, effects::library()[effect].laws[law].name);

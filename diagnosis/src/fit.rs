@@ -338,6 +338,20 @@ impl Problem {
         (there - at) / step
     }
 
+    /// Change of the predictions for a unit of a member's size, in its coordinate.
+    pub fn size_sensitivity(
+        &self,
+        members: &[Member],
+        u: &[f64],
+        at: &DVector<f64>,
+        member: usize,
+    ) -> DVector<f64> {
+        let k = Layout::of(members).member(member).start;
+        let (step, mut moved) = (STEPS[1], u.to_vec());
+        moved[k] += if u[k] + step > self.bounds(members)[k].1 { -step } else { step };
+        (self.predict(members, &moved) - at) / (moved[k] - u[k])
+    }
+
     /// Derivatives of the predictions by the coordinates, by differences into the feasible side.
     pub fn jacobian(&self, members: &[Member], u: &[f64], at: &DVector<f64>) -> DMatrix<f64> {
         let bounds = self.bounds(members);

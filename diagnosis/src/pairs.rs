@@ -1,6 +1,6 @@
 //! Two causes at once: pairs grown from the best singles. docs/diagnosis/model.md, section 7.
 
-use crate::departure::Basis;
+use crate::departure::{Basis, Freedom};
 use crate::evidence::{Posterior, averaged_over_form, laplace, middle_freedom};
 use crate::fit::{Member, Problem};
 use crate::fitted::Candidate;
@@ -175,10 +175,30 @@ fn twins(problem: &Problem, singles: &[Candidate], pair: &Posterior) -> Vec<(Vec
     .collect()
 }
 
-/// Places of pairs by a coarse scan: each of the best singles with every other effect in each of its laws, best first.
-fn coarse_starts(problem: &Problem, singles: &[Candidate], loose: &[f64]) -> Vec<Start> {
+/// Pairs of a bent leader: which second cause there is shows beside what the leader's function took up, and
+/// not beside its law alone.
+fn beside_a_function(problem: &Problem, singles: &[Candidate], loose: &[f64], basis: &Basis) -> Vec<Pair> {
     let k = &problem.constants;
-    let seeds = &singles[..singles.len().min(k.pair_seeds)];
+    let leader = &singles[0].best;
+    if leader.freedom.bend == 0.0 {
+        return Vec::new();
+    }
+    let taken = leader.departed(basis);
+    let lateral = problem.lateral.iter().zip(taken.iter()).map(|(all, taken)| all - taken).collect();
+    let rest = Problem { lateral, ..problem.clone() };
+    let mut starts = coarse_starts(&rest, &singles[..1], singles, loose);
+    starts.truncate(k.pairs_searched);
+    let found = starts.into_par_iter().filter_map(|start| {
+        let fit = refine_from(&rest, &start.members, start.u, loose)?;
+        let bent = Freedom { bend: k.bend_share, ..middle_freedom(k, &start.members) };
+        Some(Pair::of(laplace(problem, &start.members, &fit.u, basis, bent, ROUNDS[0])))
+    });
+    found.collect()
+}
+
+/// Places of pairs by a coarse scan: each of the seeds with every other effect in each of its laws, best first.
+fn coarse_starts(problem: &Problem, seeds: &[Candidate], singles: &[Candidate], loose: &[f64]) -> Vec<Start> {
+    let k = &problem.constants;
     let jobs: Vec<(usize, &Posterior)> = (0..seeds.len())
         .flat_map(|s| singles.iter().flat_map(|c| &c.laws).map(move |(_, e)| (s, e)))
         .filter(|(s, e)| e.members[0].effect != seeds[*s].effects[0])
@@ -216,7 +236,8 @@ fn coarse_starts(problem: &Problem, singles: &[Candidate], loose: &[f64]) -> Vec
 /// Pairs grown from the best singles, each with every other effect in each of its laws.
 pub fn pairs(problem: &Problem, singles: &[Candidate], loose: &[f64], basis: &Basis) -> Vec<Candidate> {
     let k = &problem.constants;
-    let first: Vec<Pair> = coarse_starts(problem, singles, loose)
+    let seeds = &singles[..singles.len().min(k.pair_seeds)];
+    let mut first: Vec<Pair> = coarse_starts(problem, seeds, singles, loose)
         .into_par_iter()
         .filter_map(|start| {
             nuisance_starts(&start.u, k.driven_sd)
@@ -226,6 +247,7 @@ pub fn pairs(problem: &Problem, singles: &[Candidate], loose: &[f64], basis: &Ba
                 .map(Pair::of)
         })
         .collect();
+    first.extend(beside_a_function(problem, singles, loose, basis));
     let mut found = with_every_law(problem, first, singles, loose, basis);
     let twins: Vec<Pair> = found
         .par_iter()

@@ -2,6 +2,7 @@
 
 use crate::data::{RigFile, Table};
 use crate::decision::{Decision, Verdict, decide};
+use crate::departure::Bends;
 use crate::describe::probability;
 use crate::hypotheses::{Fitted, Options, fit_believing};
 use crate::scatter::{Belief, Scatter};
@@ -124,8 +125,12 @@ fn bent(fitted: &Fitted, decision: &Decision) -> Option<String> {
     let nats = leader.best.log_evidence - leader.best.plain.as_ref()?.log_evidence;
     let of = leader.best.members.iter().filter(|m| leader.best.change.bends(m.effect)).map(|m| {
         let effect = effects::at(m.effect);
-        let over: Vec<&str> = effect.acts.map_or(&[][..], |acts| acts.over).iter().map(|c| c.words).collect();
-        format!("{} as a function of {}", effect.name.replace('_', " "), over.join(" and "))
+        let name = effect.name.replace('_', " ");
+        let over = effect.acts.map_or(&[][..], |acts| acts.over).iter().map(|c| c.words);
+        match leader.best.freedom.bends {
+            Bends::Input => format!("{name} as a function of {}", over.collect::<Vec<_>>().join(" and ")),
+            Bends::Size => format!("{name} whose size goes with the place or the weather,"),
+        }
     });
     let of: Vec<String> = of.collect();
     (nats > BENT_NATS).then(|| {

@@ -1,7 +1,7 @@
 //! One effect at a time: every law sought, then put together. docs/diagnosis/model.md, section 4.
 
 use crate::data::Table;
-use crate::departure::Basis;
+use crate::departure::{Basis, Bends};
 use crate::evidence::{Posterior, averaged_over_form, laplace, middle_freedom};
 use crate::fit::{Member, Problem};
 use crate::fitted::Candidate;
@@ -155,12 +155,14 @@ fn each_law(problem: &Problem, members: &[Member], search: &Search<'_>) -> Vec<O
         })
         .collect();
     let top = middle.iter().flatten().map(|e| e.log_evidence).fold(f64::NEG_INFINITY, f64::max);
+    let weighed = sized(problem, &middle, search.basis);
     middle
         .into_par_iter()
+        .enumerate()
         .with_max_len(1)
-        .map(|found| {
+        .map(|(i, found)| {
             found.map(|e| {
-                if e.log_evidence > top - k.prune_nats {
+                if e.log_evidence > top - k.prune_nats || weighed.contains(&i) {
                     let fit = Fit { u: e.u.clone(), prediction: e.prediction.clone(), cost: 0.0 };
                     averaged_over_form(problem, &fit, &e.members, search.basis)
                 } else {
@@ -169,6 +171,23 @@ fn each_law(problem: &Problem, members: &[Member], search: &Search<'_>) -> Vec<O
             })
         })
         .collect()
+}
+
+/// Laws that are weighed however far behind they are, for their size may be a function of the place or the
+/// weather: the best law of each of the best causes.
+fn sized(problem: &Problem, middle: &[Option<Posterior>], basis: &Basis) -> Vec<usize> {
+    let mut best: Vec<(usize, &Posterior)> =
+        middle.iter().enumerate().filter_map(|(i, e)| Some((i, e.as_ref()?))).collect();
+    best.retain(|(_, e)| basis.bends(&e.members, Bends::Size));
+    best.sort_by(|a, b| b.1.log_evidence.total_cmp(&a.1.log_evidence));
+    let mut seen = Vec::new();
+    best.retain(|(_, e)| {
+        let effect = e.members[0].effect;
+        let new = !seen.contains(&effect);
+        seen.push(effect);
+        new
+    });
+    best.into_iter().take(problem.constants.pair_seeds).map(|(i, _)| i).collect()
 }
 
 fn candidate(effects: Vec<usize>, laws: Vec<(f64, Posterior)>) -> Option<Candidate> {

@@ -3,7 +3,7 @@
 use crate::data::Table;
 use crate::fitted::Fitted;
 use crate::predict::{Answer, Which};
-use models::covariate::Covariate;
+use models::covariate::{Covariate, TEMPERATURE};
 
 /// A condition that lacks what the verdict's model predicts by.
 #[derive(Debug, Clone, PartialEq, Eq, thiserror::Error)]
@@ -30,10 +30,13 @@ pub(crate) fn unstated(fitted: &Fitted, answer: &Answer, conditions: &Table) -> 
 
 /// The covariates that a hypothesis predicts by and that not every table has, and what in it does.
 fn needed(fitted: &Fitted, which: Which) -> Vec<(&'static Covariate, String)> {
-    let smooth = |what: String| fitted.kernels.climate().map(move |c| (c, what.clone()));
     match which {
         Which::Baseline => Vec::new(),
-        Which::Open => smooth("the smooth map of what is unknown".to_string()).collect(),
+        Which::Open => fitted
+            .discrepancy
+            .climate()
+            .map(|c| (c, "the smooth map of what is unknown".to_string()))
+            .collect(),
         Which::Shape(i) => {
             let shape = &fitted.shapes[i];
             vec![(shape.covariate, format!("a shape over {}", shape.covariate.words))]
@@ -45,10 +48,10 @@ fn needed(fitted: &Fitted, which: Which) -> Vec<(&'static Covariate, String)> {
                 let law = format!("{} by its law '{}'", m.name(), m.form().name);
                 needs.filter_map(|n| n.covariate()).map(move |c| (c, law.clone()))
             });
-            let departs = cause.best.freedom.share > 0.0;
-            let departure = departs
-                .then(|| smooth(format!("{}, in its departure from its law,", cause.names().join(" + "))));
-            laws.chain(departure.into_iter().flatten()).collect()
+            let sized = cause.best.change.bends_over(&TEMPERATURE);
+            let sizes = sized.then(|| fitted.kernels.climate()).into_iter().flatten();
+            let sizes = sizes.map(|c| (c, format!("the size of {}", cause.names().join(" + "))));
+            laws.chain(sizes).collect()
         }
     }
 }

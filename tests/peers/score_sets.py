@@ -1,5 +1,5 @@
 #!/usr/bin/env python3
-"""Scores `muprime diagnose` on sets of third_generator.py, fourth_generator.py and fifth_generator.py.
+"""Scores `muprime diagnose` on sets of third_generator.py and its followers up to sixth_generator.py.
 
 usage: score_sets.py SETS [--program muprime] [--threads 2] [--until HH:MM]
 

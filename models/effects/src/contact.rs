@@ -8,6 +8,7 @@
 //! ([`mean_friction`]); laws that change the limit within the cycle take the sweep of [`sweep`].
 
 pub mod asperities;
+mod bonds;
 pub(crate) mod gap;
 mod held;
 pub mod impact;
@@ -15,6 +16,7 @@ mod retarded;
 mod stick;
 pub mod sweep;
 
+pub use bonds::Bonds;
 pub use held::Held;
 use models::root::{bisection, newton_or_half};
 use std::f64::consts::PI;
@@ -64,14 +66,8 @@ pub struct Contact {
     pub viscous_slip: bool,
     /// Stretch that the tissue holds from contact to contact. Nothing in the baseline.
     pub held: Held,
-    /// Time in which bonds form after touch-down, s. 0 in the baseline.
-    pub bonding_time: f64,
-    /// Exponent of the growth of bonds: 1 first order, 0.5 stretched.
-    pub bonding_exponent: f64,
-    /// Share of the limit that waits for bonds.
-    pub bonding_share: f64,
-    /// Whether bonds form by the normal force of the instant over its mean, rather than by time alone.
-    pub bonding_by_pressure: bool,
+    /// How bonds grow after touch-down.
+    pub bonds: Bonds,
     /// Scale of the heights of the asperities, m. 0 in the baseline (one height).
     pub asperity_height: f64,
     /// Distribution of the heights.
@@ -83,6 +79,8 @@ pub struct Contact {
     pub indentation_damping: f64,
     /// Mass of the ridges that follow the plate, kg. 0 in the baseline.
     pub mass: f64,
+    /// Share of the ridges without mass. 0 in the baseline.
+    pub massless_share: f64,
     /// Damping ratio of the ridges where there is mass.
     pub ridge_damping_ratio: f64,
     /// Index into [`impact::LANDINGS`] where there is mass.
@@ -144,7 +142,7 @@ impl Contact {
         self.load_exponent != 0.0
             || self.inverse_recovery_speed > 0.0
             || self.lateral_relaxation_time > 0.0
-            || self.bonding_time > 0.0
+            || self.bonds != Bonds::AtOnce
             || self.attraction != Attraction::None
             || self.normal_retardation_time > 0.0
             || self.indentation_damping > 0.0
@@ -171,6 +169,7 @@ pub fn mean_friction(c: &Contact) -> f64 {
     };
     let inertia =
         if c.mass > 0.0 && c.amplitude_pp >= STILL_PLATE_M { impact::friction_ratio(c) } else { 1.0 };
+    let inertia = inertia + c.massless_share * (1.0 - inertia);
     base * c.friction_factor * inertia
 }
 

@@ -193,6 +193,15 @@ pub enum Input {
     Crosstalk,
 }
 
+impl Acts {
+    /// Whether its size may be another in each run, as what is tared, clamped or tuned before each. Friction
+    /// that is another in each run is scatter.
+    pub fn by_run(&self) -> bool {
+        let of_time = self.over.iter().any(|c| c.name == covariate::TIME.name);
+        of_time && self.on != Input::Friction
+    }
+}
+
 /// How a law acts as a change of the baseline, exactly and on every pass: by e-folds of mu0, normal and
 /// lateral stiffness for one e-fold of the law's size.
 pub type Rescaling = [f64; 3];

@@ -23,12 +23,24 @@ mod prelude {
     /// Growth as a sensor or a mount yields under the load.
     pub const LOADED: Parameter = Parameter::signed("growth_with_load", "1", 0.3, -0.9, 2.0).bending();
 
-    /// A size alone, or one that changes by [`ALONG`] and [`LOADED`].
+    /// Share of what the vibration does at the largest amplitude and the reference frequency: by a power of the
+    /// amplitude and one of the frequency.
+    pub fn vibrating(exponents: &[f64], pass: &Condition, design: &Design) -> f64 {
+        let amplitude = pass.amplitude.metres() / design.largest_amplitude_m.max(1e-12);
+        let frequency = pass.frequency_hz / design.reference_frequency_hz;
+        amplitude.powf(exponents[0]) * frequency.powf(exponents[1])
+    }
+
+    /// Growth in the course of the table, as wax or glue creeps.
+    pub const LATER: Parameter = Parameter::signed("growth_over_table", "1", 0.5, -2.0, 2.0).bending();
+
+    /// A size alone, or one that changes by [`ALONG`], [`LOADED`] and [`LATER`].
     pub fn bent(theta: &[f64], pass: &Condition, design: &Design) -> f64 {
-        let [size, along, loaded] = *theta else { return theta[0] };
+        let [size, along, loaded, later] = *theta else { return theta[0] };
         let place = if design.stroke_m > 0.0 { pass.position_m / design.stroke_m } else { 0.0 };
         let load = pass.normal_force_n / design.reference_load_n - 1.0;
-        size * (1.0 + along * place) * (1.0 + loaded * load)
+        let time = pass.time_s / design.duration_s.max(1e-9);
+        size * (1.0 + along * place) * (1.0 + loaded * load) * (1.0 + later * time)
     }
 }
 

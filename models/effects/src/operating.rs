@@ -1,6 +1,6 @@
 //! The baseline's parameters, what the whole design says about scales, and what a reading is.
 
-use crate::contact::{Contact, Held};
+use crate::contact::{Bonds, Contact, Held};
 use models::condition::Condition;
 
 /// Reference scales of a whole table: effects that need a zero of time, load or temperature take it from here.
@@ -81,15 +81,13 @@ impl Baseline {
             relaxation_growth: 0.0,
             held: Held::NOTHING,
             viscous_slip: false,
-            bonding_time: 0.0,
-            bonding_exponent: 1.0,
-            bonding_share: 1.0,
-            bonding_by_pressure: false,
+            bonds: Bonds::AtOnce,
             asperity_height: 0.0,
             asperity_heights: crate::contact::asperities::Heights::Gaussian,
             normal_retardation_time: 0.0,
             indentation_damping: 0.0,
             mass: 0.0,
+            massless_share: 0.0,
             ridge_damping_ratio: 1.0,
             landing: 0,
             coarse: false,

@@ -3,7 +3,7 @@ use models::condition::Condition;
 use models::quantity::PeakToPeak;
 use muprime_effects::contact::asperities::Heights;
 use muprime_effects::contact::impact::{Bouncing, LANDINGS, STATED_ERROR};
-use muprime_effects::contact::{Attraction, Contact, Held, half_contact_angle, mean_friction};
+use muprime_effects::contact::{Attraction, Bonds, Contact, Held, half_contact_angle, mean_friction};
 use muprime_effects::{Baseline, Design};
 use std::f64::consts::PI;
 
@@ -148,7 +148,7 @@ fn sweep_agrees_with_the_closed_form() {
         for u in [1e-3, 5e-3, 0.02, 0.1, 0.3] {
             for f in [0.1, 0.5, 1.5] {
                 let c = contact(w, u, f, 2e6, 0.8e6);
-                let swept = Contact { bonding_time: 1e-15, ..c };
+                let swept = Contact { bonds: Bonds::Pressed { time: 1e-15, share: 1.0 }, ..c };
                 let (a, b) = (relative(&c), relative(&swept));
                 worst = worst.max((a - b).abs());
                 coarsest = coarsest.max((a - relative(&Contact { coarse: true, ..swept })).abs());
@@ -313,15 +313,11 @@ fn a_limit_that_slips_all_the_time_has_the_mean_of_its_closed_form() {
             let mean = relative(&Contact { indentation_damping, ..c });
             assert!((mean - 1.0).abs() < 2e-3, "{amplitude} {indentation_damping}: {mean}");
         }
-        for (bonding_time, bonding_share) in [(4e-6, 1.0), (30e-6, 0.5), (300e-6, 0.9)] {
-            let bonds = Contact { bonding_time, bonding_share, bonding_by_pressure: true, ..c };
-            let times = 1.0 / (c.frequency * bonding_time);
-            let expected = 1.0 + bonding_share * (-times).exp_m1() / times;
-            let mean = relative(&bonds);
-            assert!(
-                (mean / expected - 1.0).abs() < 4e-3,
-                "{amplitude} {bonding_time}: {mean} for {expected}"
-            );
+        for (time, share) in [(4e-6, 1.0), (30e-6, 0.5), (300e-6, 0.9)] {
+            let times = 1.0 / (c.frequency * time);
+            let expected = 1.0 + share * (-times).exp_m1() / times;
+            let mean = relative(&Contact { bonds: Bonds::Pressed { time, share }, ..c });
+            assert!((mean / expected - 1.0).abs() < 4e-3, "{amplitude} {time}: {mean} for {expected}");
         }
     }
 }

@@ -267,22 +267,39 @@ fn laws_change_what_they_state_by_their_formula() {
     });
     same(unbroken[0], unbroken[1]);
     assert!(parted[1] < 0.99 * parted[0], "{parted:?}");
+    // A finger that never leaves loads the plate all the time; the range of a vibrometer ends at half of the
+    // largest amplitude; a motor slows by a square of the load.
+    let plain = |pass: &Condition| lateral_force(&BASELINE, &[], pass, &DESIGN);
+    let in_touch = "impedance by the share of the cycle in touch";
+    same(force(&BASELINE, "amplitude_droop", in_touch, &[0.25, 1.7], &moving(0.05)), plain(&moving(0.04)));
+    let largest = DESIGN.largest_amplitude_m * 1e6;
+    let ranged = |um: f64| {
+        let law = "another gain above an amplitude";
+        force(&BASELINE, "amplitude_miscalibration", law, &[0.2, 0.5], &moving(um))
+    };
+    same(ranged(0.2 * largest), plain(&moving(0.2 * largest)));
+    same(ranged(0.8 * largest), plain(&moving(0.8 * largest * 0.2f64.exp())));
+    let slower =
+        |speed_m_s| Condition { speed_m_s, normal_force_n: 2.0 * DESIGN.reference_load_n, ..moving(1.0) };
+    let dragged = force(&BASELINE, "speed_error", "constant", &[-0.002, 2.0], &slower(0.02));
+    same(dragged, plain(&slower(0.02 - 4.0 * 0.002)));
     // Half of the menisci are there at the onset, and all of them in wet air.
     let humid = |percent| Condition { relative_humidity_pct: Some(percent), ..moving(1.0) };
-    let dmt = |newtons: f64| force(&BASELINE, "adhesion", "DMT", &[newtons, 0.0, 0.0], &moving(1.0));
+    let dmt = |newtons: f64| force(&BASELINE, "adhesion", "DMT", &[newtons, 0.0, 0.0, 0.0], &moving(1.0));
     for (percent, share) in [(50.0, 0.5), (500.0, 1.0)] {
         same(force(&BASELINE, "adhesion", "menisci", &[0.1, 50.0, 4.0], &humid(percent)), dmt(0.1 * share));
     }
     // A lever arm as long as the stroke doubles a cross-talk at its end; at twice the reference load half as
-    // much comes on top.
+    // much comes on top, and at the end of the table a quarter.
     let mean = DESIGN.reference_load_n;
     let still = |position_m, normal_force_n| Condition { position_m, normal_force_n, ..moving(0.0) };
     let read = |pass: &Condition| {
-        force(&BASELINE, "force_crosstalk", "normal into lateral", &[0.02, 1.0, 0.5], pass)
+        force(&BASELINE, "force_crosstalk", "normal into lateral", &[0.02, 1.0, 0.5, 0.25], pass)
             - lateral_force(&BASELINE, &[], pass, &DESIGN)
     };
+    let late = Condition { time_s: DESIGN.duration_s, ..still(0.0, mean) };
     for (pass, crosstalk) in
-        [(still(0.0, mean), 0.02), (still(0.03, mean), 0.04), (still(0.0, 2.0 * mean), 0.03)]
+        [(still(0.0, mean), 0.02), (still(0.03, mean), 0.04), (still(0.0, 2.0 * mean), 0.03), (late, 0.025)]
     {
         same(read(&pass), crosstalk * pass.normal_force_n);
     }

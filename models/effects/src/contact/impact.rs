@@ -376,7 +376,7 @@ mod tests {
         let effect = by_name("ridge_inertia").expect("an effect of the library");
         for (law, exponent, dampings) in [(0, 0.0, 2), (1, 0.6, 6), (2, 0.0, 2)] {
             let made = || table(law).iter().filter(|node| node.get().is_some()).count();
-            (effect.prepare)(law, &[1e-5, 0.35, exponent]);
+            (effect.prepare)(law, &[1e-5, 0.35, exponent, 0.0]);
             let before = made();
             assert_eq!(before, dampings * LOAD.count * RATIO.count);
             assert!(changed_passes(effect, law, exponent) > 50);
@@ -410,7 +410,7 @@ mod tests {
                                 normal_force_n,
                                 ..Condition::paper()
                             };
-                            let theta = [mass_kg, 0.35, exponent];
+                            let theta = [mass_kg, 0.35, exponent, 0.0];
                             let active = [Active { effect, law, theta: &theta }];
                             let with = lateral_force(&baseline, &active, &pass, &design);
                             let without = lateral_force(&baseline, &[], &pass, &design);

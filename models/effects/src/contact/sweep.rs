@@ -65,10 +65,8 @@ pub fn mean_friction(c: &Contact) -> f64 {
         if c.load_exponent != 0.0 {
             limit *= (*f / c.reference_load).max(1e-6).powf(c.load_exponent);
         }
-        if c.bonding_time > 0.0 && !always {
-            let age = if c.bonding_by_pressure { pressed } else { i as f64 * dt } / c.bonding_time;
-            let age = if c.bonding_exponent == 1.0 { age } else { age.powf(c.bonding_exponent) };
-            limit *= 1.0 - c.bonding_share * (-age).exp();
+        if !always {
+            limit *= c.bonds.grown(i as f64 * dt, pressed);
         }
         *f = limit / c.lateral_stiffness;
     }

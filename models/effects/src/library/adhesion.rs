@@ -20,7 +20,8 @@ pub(super) static EFFECT: Effect = Effect {
             &[
                 FORCE,
                 Parameter::signed("load_exponent", "1", 0.15, -0.4, 0.7).bending(),
-                Parameter::signed("plate_speed_exponent", "1", 0.3, -1.0, 2.2).bending(),
+                Parameter::signed("plate_speed_exponent", "1", 0.7, -1.0, 2.2).bending(),
+                Parameter::signed("frequency_exponent", "1", 0.7, -3.0, 3.0).bending(),
             ],
         ),
         Law::new(
@@ -55,7 +56,9 @@ pub(super) static EFFECT: Effect = Effect {
         match law {
             0 => {
                 let load = (c.normal_force / design.reference_load_n).max(1e-3);
-                c.adhesion = theta[0] * load.powf(theta[1]) * design.plate_speed(c).powf(theta[2]);
+                let frequency = c.frequency / design.reference_frequency_hz;
+                let plate = design.plate_speed(c).powf(theta[2]) * frequency.powf(theta[3]);
+                c.adhesion = theta[0] * load.powf(theta[1]) * plate;
             }
             5 => {
                 let humidity = pass.relative_humidity_pct.unwrap_or(theta[1]);

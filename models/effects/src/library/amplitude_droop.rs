@@ -1,6 +1,7 @@
 //! The finger loads the plate and its amplitude falls.
 
 use super::prelude::*;
+use crate::contact::{STILL_PLATE_M, half_contact_angle};
 
 /// What sees it without friction.
 const CHECK: &str = "Measure the plate with a vibrometer while the finger is pressed on it.";
@@ -23,8 +24,15 @@ pub(super) static EFFECT: Effect = Effect {
             ],
         )
         .seen_by(CHECK, 0.015),
-        Law::new("linear loss", &[Parameter::positive("droop_per_load", "1/N", 0.4, 3.0)])
-            .seen_by(CHECK, 0.05),
+        // A stiff plate is loaded while it is touched.
+        Law::new(
+            "impedance by the share of the cycle in touch",
+            &[
+                Parameter::positive("droop_in_full_touch", "1", 0.5, 5.0),
+                Parameter::shape("exponent", "1", 1.0, 0.5),
+            ],
+        )
+        .seen_by(CHECK, 0.015),
     ],
     acts: Some(Acts { on: Input::Amplitude, over: &[&covariate::NORMAL_FORCE] }),
     needs: &[Need::Vibration, Need::Loads],
@@ -37,7 +45,11 @@ pub(super) static EFFECT: Effect = Effect {
                 let frequency = (c.frequency / design.reference_frequency_hz).powf(theta[3]);
                 1.0 / (1.0 + theta[0] * load * amplitude * frequency)
             }
-            _ => (1.0 - theta[0] * c.normal_force).max(0.02),
+            _ if c.amplitude_pp > STILL_PLATE_M => {
+                let touched = half_contact_angle(c.load_ratio(), 0.0) / std::f64::consts::PI;
+                1.0 / (1.0 + theta[0] * touched.powf(theta[1]))
+            }
+            _ => 1.0,
         };
     },
     ..Effect::NONE

@@ -10,37 +10,23 @@ pub(super) static EFFECT: Effect = Effect {
     place: Location::Plate,
     summary: "Above some command the amplitude no longer follows.",
     source: "rail voltage and depolarisation limits of piezo drives",
-    laws: &[
-        Law::new("hard limit", &[Parameter::positive("inverse_limit", "1/m", 0.3e6, 5e6)])
-            .seen_by(CHECK, 2e4),
-        Law::new(
-            "limit with a bend",
-            &[
-                Parameter::positive("inverse_limit", "1/m", 0.3e6, 5e6),
-                Parameter::shape("sharpness", "1", 4.0, 0.6),
-                // A current that is limited drives less the higher the frequency; a voltage, the same.
-                Parameter::signed("frequency_exponent", "1", 0.5, -1.0, 2.0).bending(),
-                // Beyond its limit a drive that heats up or loses its resonance gives less, not as much.
-                Parameter::shape("steepness_beyond_limit", "1", 1.0, 0.4).bending(),
-            ],
-        )
-        .seen_by(CHECK, 2e4),
-        Law::new("compression", &[Parameter::positive("inverse_limit", "1/m", 0.2e6, 5e6)])
-            .seen_by(CHECK, 2e4),
-    ],
+    laws: &[Law::new(
+        "limit with a bend",
+        &[
+            Parameter::positive("inverse_limit", "1/m", 0.3e6, 5e6),
+            Parameter::shape("sharpness", "1", 4.0, 0.6),
+            // A current that is limited drives less the higher the frequency; a voltage, the same.
+            Parameter::signed("frequency_exponent", "1", 0.5, -1.0, 2.0).bending(),
+            // Beyond its limit a drive that heats up or loses its resonance gives less, not as much.
+            Parameter::shape("steepness_beyond_limit", "1", 1.0, 0.4).bending(),
+        ],
+    )
+    .seen_by(CHECK, 2e4)],
     acts: Some(Acts { on: Input::Amplitude, over: &[&covariate::AMPLITUDE] }),
     needs: &[Need::Vibration, Need::Amplitudes],
-    change: |law, theta, _, design, c| {
-        let x = theta[0] * c.amplitude_pp;
-        c.amplitude_pp *= match law {
-            0 => 1.0 / x.max(1.0),
-            1 => {
-                let x = x * (c.frequency / design.reference_frequency_hz).powf(theta[2]);
-                (1.0 + x.powf(theta[1])).powf(-theta[3] / theta[1])
-            }
-            _ if x > 1e-6 => x.tanh() / x,
-            _ => 1.0,
-        };
+    change: |_, theta, _, design, c| {
+        let x = theta[0] * c.amplitude_pp * (c.frequency / design.reference_frequency_hz).powf(theta[2]);
+        c.amplitude_pp *= (1.0 + x.powf(theta[1])).powf(-theta[3] / theta[1]);
     },
     ..Effect::NONE
 };

@@ -1,6 +1,10 @@
 //! Bonds need time to form after each touch-down.
 
 use super::prelude::*;
+use crate::contact::Bonds;
+
+/// Speed below which junctions get no older, m/s.
+const LEAST_SPEED: f64 = 1e-6;
 
 const TIME: Parameter = Parameter::positive("bonding_time", "s", 15e-6, 1e-3);
 const WAITS: Parameter = Parameter::between("share_that_waits", "1", 0.1, 1.0);
@@ -9,7 +13,8 @@ pub(super) static EFFECT: Effect = Effect {
     name: "contact_ageing",
     place: Location::Contact,
     summary: "Short contacts have not yet formed all their bonds, so the limit is lower than mu0 F.",
-    source: "stochastic adhesion (section 5.4 of the paper); bonding times of 1 to 100 us",
+    source: "stochastic adhesion (section 5.4 of the paper); bonding times of 1 to 100 us; ageing law of rock and \
+             paper (Dieterich 1979)",
     laws: &[
         Law::new("first order", &[TIME]),
         Law::new(
@@ -19,20 +24,36 @@ pub(super) static EFFECT: Effect = Effect {
         Law::new("a share at once, the rest by mean contact time", &[TIME, WAITS]),
         // A junction forms as it is pressed: by the normal force of the instant over its mean.
         Law::new("a share at once, the rest by pressing", &[TIME, WAITS]),
+        Law::new(
+            "logarithm of the age, renewed by slip",
+            &[
+                Parameter::positive("growth_per_e_fold_of_age", "1", 0.1, 1.0),
+                Parameter::shape("slip_distance", "m", 0.5e-6, 1.0),
+                Parameter::shape("least_age", "s", 0.5e-6, 0.8).bending(),
+            ],
+        ),
     ],
     needs: &[Need::Vibration],
-    change: |law, theta, _, _, c| {
-        if law != 2 {
-            c.bonding_time = theta[0];
-            c.bonding_share = theta.get(1).copied().unwrap_or(1.0);
-            c.bonding_exponent = theta.get(2).copied().unwrap_or(1.0);
-            c.bonding_by_pressure = law == 3;
-        } else if c.amplitude_pp > crate::contact::STILL_PLATE_M {
-            let phi = crate::contact::half_contact_angle(c.load_ratio(), 0.0);
-            if phi < std::f64::consts::PI {
-                let time = phi / (std::f64::consts::PI * c.frequency);
-                c.mu0 *= 1.0 - theta[1] * theta[0] / (time + theta[0]);
+    change: |law, theta, _, _, c| match law {
+        2 => {
+            if c.amplitude_pp > crate::contact::STILL_PLATE_M {
+                let phi = crate::contact::half_contact_angle(c.load_ratio(), 0.0);
+                if phi < std::f64::consts::PI {
+                    let time = phi / (std::f64::consts::PI * c.frequency);
+                    c.mu0 *= 1.0 - theta[1] * theta[0] / (time + theta[0]);
+                }
             }
+        }
+        // Of size zero they are there at once.
+        _ if theta[0] == 0.0 => {}
+        3 => c.bonds = Bonds::Pressed { time: theta[0], share: theta[1] },
+        4 => {
+            let steady = theta[1] / c.speed.max(LEAST_SPEED);
+            c.bonds = Bonds::Renewed { strength: theta[0], time: theta[2], steady };
+        }
+        _ => {
+            let shape = |i: usize| theta.get(i).copied().unwrap_or(1.0);
+            c.bonds = Bonds::Stretched { time: theta[0], share: shape(1), exponent: shape(2) };
         }
     },
     ..Effect::NONE

@@ -14,7 +14,7 @@ pub(super) static EFFECT: Effect = Effect {
     laws: &[
         Law::new(
             "normal into lateral",
-            &[Parameter::signed("crosstalk", "1", 0.03, -0.3, 0.3), ALONG, LOADED],
+            &[Parameter::signed("crosstalk", "1", 0.03, -0.3, 0.3), ALONG, LOADED, LATER],
         )
         .certified_by(CertifiedKey::Crosstalk)
         .same_as("plate_tilt", "rotation")

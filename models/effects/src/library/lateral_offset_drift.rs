@@ -36,6 +36,17 @@ pub(super) static EFFECT: Effect = Effect {
         )
         .needs(&[Need::Temperatures])
         .seen_by(CHECK, 0.0005),
+        // What the amplifier of the drive leaves in the bridge's wires.
+        Law::new(
+            "by the drive",
+            &[
+                Parameter::signed("offset_at_full_vibration", "N", 0.01, -0.3, 0.3),
+                Parameter::shape("exponent", "1", 1.3, 0.3).bending(),
+                Parameter::signed("frequency_exponent", "1", 1.5, -2.0, 5.0).bending(),
+            ],
+        )
+        .needs(&[Need::Vibration, Need::Amplitudes])
+        .seen_by(CHECK, 0.0005),
     ],
     acts: Some(Acts { on: Input::Offset, over: &[&covariate::TIME] }),
     needs: &[Need::Directions],
@@ -49,6 +60,7 @@ pub(super) static EFFECT: Effect = Effect {
                 let warmer = pass.temperature_c.map_or(0.0, |t| t - design.reference_temperature_c);
                 theta[0] + theta[1] * warmer
             }
+            5 => theta[0] * vibrating(&theta[1..], pass, design),
             _ => -theta[0] * (-pass.elapsed_s(theta[2]) / (theta[1] * design.duration_s.max(1e-9))).exp_m1(),
         };
     },

@@ -11,6 +11,8 @@ const FLIGHT: &[Parameter] = &[
     Parameter::shape("damping_ratio", "1", 0.5, 0.7).at_most(MOST_DAMPED),
     // A damping of the square grows with the plate's speed; one that thins with shear falls.
     Parameter::signed("plate_speed_exponent", "1", 0.2, -1.0, 1.5).bending(),
+    // Where sweat fills the grooves the ridges are heavy; the others follow the plate.
+    Parameter::positive("share_without_mass", "1", 0.3, 0.9).bending(),
 ];
 
 pub(super) static EFFECT: Effect = Effect {
@@ -29,6 +31,7 @@ pub(super) static EFFECT: Effect = Effect {
         c.mass = theta[0];
         c.ridge_damping_ratio = damping_ratio(theta, design.plate_speed(c));
         c.landing = law;
+        c.massless_share = theta[3];
     },
     prepare: |law, theta| crate::contact::impact::prepare(law, PLATE_SPEEDS.map(|s| damping_ratio(theta, s))),
     ..Effect::NONE
