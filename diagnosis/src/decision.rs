@@ -1,10 +1,12 @@
 //! From probabilities to a verdict and its alias class. docs/diagnosis/model.md, section 9.
 
-use crate::departure::{Bends, Freedom};
+use crate::bases::Bends;
+use crate::departure::Freedom;
 use crate::evidence::{Posterior, laplace};
 use crate::fitted::{Candidate, Fitted};
 use crate::left_out::{Gate, Region, gate, left_out_regions};
 use effects::{Input, imitated};
+use models::covariate::POSITION;
 use rayon::prelude::*;
 
 /// The four answers.
@@ -188,7 +190,7 @@ fn departed_singles(fitted: &Fitted, leader: usize) -> Vec<usize> {
     let candidates = &fitted.candidates;
     let (k, own) = (&*fitted.problem.constants, &candidates[leader]);
     if own.effects.len() < 2 {
-        return Vec::new();
+        return placed_singles(fitted, own);
     }
     let gap = left(fitted, &fitted.none);
     let might = |i: usize| {
@@ -199,6 +201,20 @@ fn departed_singles(fitted: &Fitted, leader: usize) -> Vec<usize> {
         .filter(|&i| candidates[i].effects.len() == 1 && own.effects.contains(&candidates[i].effects[0]))
         .filter(|&i| might(i))
         .collect()
+}
+
+/// Of a leader whose size is a function of the place: the causes that go with the place by their mechanism,
+/// where the evidence for the function is small.
+fn placed_singles(fitted: &Fitted, own: &Candidate) -> Vec<usize> {
+    let sized = own.best.freedom.bends == Bends::Size && own.best.change.bends_over(&POSITION);
+    let by_mechanism = |c: &Candidate| {
+        let over = effects::at(c.effects[0]).acts.map_or(&[][..], |acts| acts.over);
+        c.effects.len() == 1 && c.effects != own.effects && over.iter().any(|c| c.name == POSITION.name)
+    };
+    let near =
+        |c: &Candidate| own.log_evidence - c.log_evidence < fitted.problem.constants.pair_own_form_nats;
+    let all = fitted.candidates.iter().enumerate();
+    all.filter(|(_, c)| sized && by_mechanism(c) && near(c)).map(|(i, _)| i).collect()
 }
 
 /// chi2 beyond scatter that the best of a cause's laws leaves with a smooth departure of the largest share.

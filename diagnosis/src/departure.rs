@@ -4,19 +4,13 @@
 //! on one input (the amplitude, say) by a size that is a function of few covariates (of time alone), that
 //! function may be any smooth one: the mechanism stays, the formula goes.
 
-use crate::constants::Constants;
+use crate::bases::{Basis, Bends, goes_with_place};
 use crate::fit::Problem;
-use crate::kernel::{COUNT, Coordinates, Kernel, Lengths, form_lengths};
 use crate::layout::{Layout, NUISANCES};
 use crate::member::Member;
 use crate::recalibration::Recalibration;
-use effects::Input;
-use models::condition::Condition;
-use models::covariate::{Covariate, Role, SMOOTH, TIME};
+use models::covariate::{Covariate, Role};
 use nalgebra::{DMatrix, DVector};
-
-/// Correlation length over the starts of runs, in standard deviations of time.
-const RUN_LENGTH: f64 = 0.02;
 
 /// Standard deviations of the departures, as shares of the cause's change net of recalibration.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -29,16 +23,6 @@ pub struct Freedom {
     pub bends: Bends,
 }
 
-/// What a cause's function replaces.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub enum Bends {
-    /// What the cause acts on, over the covariates of its mechanism ([`effects::Acts`]).
-    Input,
-    /// Its size, over the weather and, where no other effect is that, over the place: a stiffness that is
-    /// another along the plate, a damping that falls as it warms.
-    Size,
-}
-
 impl Freedom {
     /// None: the library's form, or no cause.
     pub const NONE: Freedom = Freedom::share(0.0);
@@ -46,186 +30,6 @@ impl Freedom {
     /// Of the change alone.
     pub const fn share(share: f64) -> Self {
         Freedom { share, bend: 0.0, bends: Bends::Input }
-    }
-}
-
-/// The kernels of all departures on one table.
-#[derive(Debug, Clone)]
-pub struct Kernels {
-    coordinates: Coordinates,
-    largest_amplitude: f64,
-    smooth: (Lengths, Kernel),
-    /// By effect; without those whose covariates do not change in the table.
-    bends: Vec<Bend>,
-    /// Over the weather, and over the place too; none where these do not change.
-    sizes: [Option<(Lengths, Kernel)>; 2],
-}
-
-/// A smooth function that bends what an effect acts on.
-#[derive(Debug, Clone)]
-struct Bend {
-    effect: usize,
-    /// Whether it goes over the start of the run, each run apart, in the place of time.
-    by_run: bool,
-    lengths: Lengths,
-    kernel: Kernel,
-}
-
-impl Bend {
-    fn place(&self, coordinates: &Coordinates, p: &Condition, largest_amplitude: f64) -> [f64; COUNT] {
-        coordinates.place(&at_start(p, self.by_run), largest_amplitude, &self.lengths)
-    }
-}
-
-/// The condition at the start of its run.
-fn at_start(p: &Condition, by_run: bool) -> Condition {
-    let since = if by_run { p.time_in_run_s() } else { 0.0 };
-    Condition { time_s: p.time_s - since, ..*p }
-}
-
-impl Kernels {
-    /// The kernels on a table's passes, for these effects.
-    pub fn on(problem: &Problem, coordinates: Coordinates, effects: &[usize]) -> Self {
-        let k = &problem.constants;
-        let largest = problem.design.largest_amplitude_m;
-        let kernel = |lengths: &Lengths, by_run: bool| {
-            let place = |p: &Condition| coordinates.place(&at_start(p, by_run), largest, lengths);
-            let places: Vec<_> = problem.passes.iter().map(place).collect();
-            Kernel::new(&places, k.form_rank, k.kernel_rest)
-        };
-        let smooth = form_lengths(k);
-        let smooth = (smooth, kernel(&smooth, false));
-        let bends = effects.iter().filter_map(|&effect| Some((effect, effects::at(effect).acts?)));
-        let bends = bends.flat_map(|(effect, acts)| {
-            let over = (false, bend_lengths(k, acts.over));
-            let runs = acts.by_run().then(|| (true, run_lengths(k)));
-            [Some(over), runs].into_iter().flatten().map(move |(by_run, lengths)| (effect, by_run, lengths))
-        });
-        let bends = bends.map(|(effect, by_run, lengths)| {
-            let kernel = kernel(&lengths, by_run);
-            Bend { effect, by_run, lengths, kernel }
-        });
-        let bends = bends.filter(|bend| bend.kernel.rank() > 1).collect();
-        let sizes = [false, true].map(|place| {
-            let lengths = size_lengths(k, place);
-            Some((lengths, kernel(&lengths, false))).filter(|(_, kernel)| kernel.rank() > 1)
-        });
-        Kernels { largest_amplitude: largest, smooth, bends, sizes, coordinates }
-    }
-
-    /// Temperature and humidity, where the smooth functions go over them.
-    pub fn climate(&self) -> impl Iterator<Item = &'static Covariate> + '_ {
-        self.coordinates.climate()
-    }
-
-    /// Their bases at passes.
-    pub fn at(&self, passes: &[Condition]) -> Basis {
-        self.of(passes, |_| true)
-    }
-
-    /// The bases that one hypothesis needs.
-    pub fn for_members(&self, passes: &[Condition], members: &[Member]) -> Basis {
-        self.of(passes, |effect| members.iter().any(|m| m.effect == effect))
-    }
-
-    fn of(&self, passes: &[Condition], needed: impl Fn(usize) -> bool) -> Basis {
-        let basis = |(lengths, kernel): &(Lengths, Kernel)| {
-            let place = |p: &Condition| self.coordinates.place(p, self.largest_amplitude, lengths);
-            kernel.matrix(&passes.iter().map(place).collect::<Vec<_>>())
-        };
-        let mut bends: Vec<(usize, DMatrix<f64>)> = Vec::new();
-        for bend in self.bends.iter().filter(|bend| needed(bend.effect)) {
-            let place = |p: &Condition| bend.place(&self.coordinates, p, self.largest_amplitude);
-            let columns = bend.kernel.matrix(&passes.iter().map(place).collect::<Vec<_>>());
-            match bends.last_mut() {
-                // The functions add.
-                Some((effect, all)) if *effect == bend.effect => {
-                    *all = beside_each_other(std::mem::take(all), &columns);
-                }
-                _ => bends.push((bend.effect, columns)),
-            }
-        }
-        Basis {
-            smooth: basis(&self.smooth),
-            bends,
-            sizes: self.sizes.each_ref().map(|of| of.as_ref().map(basis)),
-        }
-    }
-}
-
-/// The columns of one function and of another: the functions add.
-fn beside_each_other(first: DMatrix<f64>, other: &DMatrix<f64>) -> DMatrix<f64> {
-    let (before, more) = (first.ncols(), other.ncols());
-    let mut all = first.resize_horizontally(before + more, 0.0);
-    all.columns_mut(before, more).copy_from(other);
-    all
-}
-
-/// Over the starts of the runs, so short that each run is apart.
-fn run_lengths(k: &Constants) -> Lengths {
-    Lengths { time: RUN_LENGTH, ..bend_lengths(k, &[&TIME]) }
-}
-
-/// Over the weather, and over the place too, as smooth as a departure from form.
-fn size_lengths(k: &Constants, place: bool) -> Lengths {
-    let (far, climate) = (f64::INFINITY, k.form_length);
-    let position = if place { climate } else { far };
-    Lengths { condition: far, time: far, position, climate, seen: [true; COUNT] }
-}
-
-/// Whether the size of an effect may go with the place: not where another effect of the library is that.
-fn goes_with_place(effect: usize) -> bool {
-    !effects::at(effect).acts.is_some_and(|acts| matches!(acts.on, Input::Amplitude | Input::Speed))
-}
-
-fn bend_lengths(k: &Constants, over: &[&Covariate]) -> Lengths {
-    let place = over.iter().any(|c| c.role == Role::Place);
-    Lengths {
-        condition: if place { k.form_length } else { k.bend_length },
-        time: k.bend_length,
-        position: k.bend_place_length,
-        climate: f64::INFINITY,
-        seen: std::array::from_fn(|i| over.iter().any(|c| c.name == SMOOTH[i].name)),
-    }
-}
-
-/// Values of the smooth functions at some passes.
-#[derive(Debug, Clone)]
-pub struct Basis {
-    /// Over all covariates: a row a pass.
-    pub smooth: DMatrix<f64>,
-    bends: Vec<(usize, DMatrix<f64>)>,
-    /// Over the weather, and over the place too.
-    sizes: [Option<DMatrix<f64>>; 2],
-}
-
-impl Basis {
-    /// Of no departure.
-    pub fn none(passes: usize) -> Self {
-        Basis { smooth: DMatrix::zeros(passes, 0), bends: Vec::new(), sizes: [None, None] }
-    }
-
-    /// Of some of the passes.
-    pub fn select(&self, rows: &[usize]) -> Self {
-        let of = |m: &DMatrix<f64>| m.select_rows(rows.iter());
-        let bends = self.bends.iter().map(|(e, m)| (*e, of(m))).collect();
-        Basis {
-            smooth: of(&self.smooth),
-            bends,
-            sizes: self.sizes.each_ref().map(|sizes| sizes.as_ref().map(of)),
-        }
-    }
-
-    fn of(&self, effect: usize, bends: Bends) -> Option<&DMatrix<f64>> {
-        match bends {
-            Bends::Input => self.bends.iter().find(|(e, _)| *e == effect).map(|(_, basis)| basis),
-            Bends::Size => self.sizes[usize::from(goes_with_place(effect))].as_ref(),
-        }
-    }
-
-    /// Whether a member of a hypothesis can be bent so.
-    pub fn bends(&self, members: &[Member], bends: Bends) -> bool {
-        members.iter().any(|m| self.of(m.effect, bends).is_some())
     }
 }
 
@@ -384,11 +188,14 @@ fn beside_recalibration(problem: &Problem, jacobian: &DMatrix<f64>, force: &DVec
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::bases::Kernels;
     use crate::data::Table;
     use crate::evidence::{averaged_over_form, laplace};
     use crate::example::{Deviates, rig, table};
+    use crate::kernel::Coordinates;
     use crate::least_squares::minimise;
     use effects::{Baseline, by_name};
+    use models::condition::Condition;
 
     /// A table on which the amplitude falls to half of itself and comes back while the plate passes through
     /// its resonance.

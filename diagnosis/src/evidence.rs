@@ -4,8 +4,9 @@
 //! could imitate, delta a smooth Gaussian process of unit variance over the operating space, s on a grid.
 //! The integral over the parameters is Laplace's, with the half-line of a size that cannot be negative.
 
+use crate::bases::{Basis, Bends};
 use crate::constants::Constants;
-use crate::departure::{Basis, Bends, Change, Freedom};
+use crate::departure::{Change, Freedom};
 use crate::fit::{Member, Problem};
 use crate::gaussian::{Covariance, HALF_LN_2PI, log_sum_exp};
 use crate::layout::{Layout, NUISANCES};
@@ -271,7 +272,7 @@ pub fn averaged_over_form(
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::departure::Kernels;
+    use crate::bases::Kernels;
     use crate::example::{Deviates, rig, table};
     use crate::kernel::Coordinates;
     use crate::least_squares::minimise;

@@ -1,7 +1,7 @@
 //! All that was fitted to a table; how probable each hypothesis is. docs/diagnosis/model.md, section 8.
 
+use crate::bases::{Basis, Kernels};
 use crate::data::RigFile;
-use crate::departure::{Basis, Kernels};
 use crate::discrepancy::Discrepancy;
 use crate::evidence::Posterior;
 use crate::fit::Problem;

@@ -1,8 +1,8 @@
 //! The hypotheses and the order of their fits. docs/diagnosis/model.md, section 4.
 
+use crate::bases::{Basis, Kernels};
 use crate::constants::Constants;
 use crate::data::{RigFile, Table};
-use crate::departure::{Basis, Kernels};
 use crate::discrepancy::Discrepancy;
 use crate::evidence::{Posterior, averaged_over_form};
 use crate::fit::Problem;

@@ -1,6 +1,6 @@
 //! Parameter intervals by profile likelihood, with their shape. docs/diagnosis/model.md, section 10.
 
-use crate::departure::Basis;
+use crate::bases::Basis;
 use crate::evidence::Posterior;
 use crate::fit::Problem;
 use crate::gaussian::Covariance;

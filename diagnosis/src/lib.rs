@@ -9,6 +9,7 @@
 //! | [`member`], [`fit`], [`layout`], [`least_squares`] | the regression problem of a hypothesis, its vector of parameters, its fit |
 //! | [`gaussian`], [`kernel`] | Gaussian algebra of low rank; smooth functions over the operating space |
 //! | [`departure`] | how a hypothesis may depart from its form: smoothly, and by bending what its cause acts on |
+//! | [`bases`] | the smooth functions by which it may, on one table |
 //! | [`evidence`] | marginal likelihood by Laplace's method, with that departure |
 //! | [`recalibration`] | what recalibrating the baseline imitates of a change |
 //! | [`discrepancy`] | the open set: a Gaussian-process discrepancy of the baseline |
@@ -45,6 +46,7 @@
 //! # Ok::<(), Box<dyn std::error::Error>>(())
 //! ```
 
+pub mod bases;
 pub mod certificates;
 pub mod constants;
 pub mod data;

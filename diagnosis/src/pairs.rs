@@ -1,6 +1,7 @@
 //! Two causes at once: pairs grown from the best singles. docs/diagnosis/model.md, section 7.
 
-use crate::departure::{Basis, Freedom};
+use crate::bases::Basis;
+use crate::departure::Freedom;
 use crate::evidence::{Posterior, averaged_over_form, laplace, middle_freedom};
 use crate::fit::{Member, Problem};
 use crate::fitted::Candidate;

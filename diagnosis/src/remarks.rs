@@ -1,8 +1,8 @@
 //! Remarks beside a verdict, in words: what is missing from the table, what was assumed, what its scatter says.
 
+use crate::bases::Bends;
 use crate::data::{RigFile, Table};
 use crate::decision::{Decision, Verdict, decide};
-use crate::departure::Bends;
 use crate::describe::probability;
 use crate::hypotheses::{Fitted, Options, fit_believing};
 use crate::scatter::{Belief, Scatter};

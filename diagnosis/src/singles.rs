@@ -1,7 +1,7 @@
 //! One effect at a time: every law sought, then put together. docs/diagnosis/model.md, section 4.
 
+use crate::bases::{Basis, Bends};
 use crate::data::Table;
-use crate::departure::{Basis, Bends};
 use crate::evidence::{Posterior, averaged_over_form, laplace, middle_freedom};
 use crate::fit::{Member, Problem};
 use crate::fitted::Candidate;

@@ -3,9 +3,9 @@
 //! A cause is uncertain in its parameters and its departure from form, the open set in its smooth parts, all
 //! in the baseline. A second pass at a condition adds less: the hypothesis' own doubt about it is gone.
 
+use crate::bases::Basis;
 use crate::data::RigFile;
 use crate::decision::Decision;
-use crate::departure::Basis;
 use crate::evidence::Posterior;
 use crate::fit::Problem;
 use crate::fitted::Fitted;

@@ -312,7 +312,7 @@ mod tests {
             let (_, _, scatter) =
                 crate::noise::settle(&table, &rig(), &mut problem, &crate::scatter::Belief::Judged);
             let fit = minimise(&problem, &[], &[0.0; NUISANCES], &problem.variance, 15);
-            let basis = crate::departure::Basis::none(problem.len());
+            let basis = crate::bases::Basis::none(problem.len());
             let (_, none) = crate::evidence::averaged_over_form(&problem, &fit, &[], &basis);
             let best = &shapes(&problem, &none, &scatter)[0];
             let gap = problem.misfit(&none.prediction) - problem.len() as f64;

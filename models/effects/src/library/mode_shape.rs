@@ -54,7 +54,15 @@ pub(super) static EFFECT: Effect = Effect {
             ],
         )
         .seen_by(CHECK, 0.03),
-        Law::new("gradient", &[Parameter::signed("gradient", "1/m", 10.0, -60.0, 60.0)]).seen_by(CHECK, 1.0),
+        Law::new(
+            "gradient",
+            &[
+                Parameter::signed("gradient", "1/m", 10.0, -60.0, 60.0),
+                // A near field dies away from an edge or a clamp.
+                Parameter::signed("curvature", "1/m^2", 800.0, -1e4, 1e4).bending(),
+            ],
+        )
+        .seen_by(CHECK, 1.0),
     ],
     acts: Some(Acts { on: Input::Amplitude, over: &[&covariate::POSITION, &covariate::FREQUENCY] }),
     needs: &[Need::Vibration, Need::Positions],
@@ -75,7 +83,10 @@ pub(super) static EFFECT: Effect = Effect {
                 let depth = theta[0].min(1.0);
                 (1.0 - depth * (1.0 - ring * ring)).max(LEAST_SQUARE).sqrt() * (depth * theta[4]).exp()
             }
-            _ => (theta[0] * (x - 0.5 * design.stroke_m)).clamp(-2.0, 2.0).exp(),
+            _ => {
+                let (x, half) = (x - 0.5 * design.stroke_m, 0.5 * design.stroke_m);
+                (theta[0] * x + theta[1] * (x * x - half * half / 3.0)).clamp(-2.0, 2.0).exp()
+            }
         };
     },
     ..Effect::NONE
