@@ -5,7 +5,7 @@ use crate::departure::Freedom;
 use crate::evidence::{Posterior, laplace};
 use crate::fitted::{Candidate, Fitted};
 use crate::left_out::{Gate, Region, gate, left_out_regions};
-use effects::{Input, imitated};
+use effects::{Input, imitated, one_cause};
 use models::covariate::POSITION;
 use rayon::prelude::*;
 
@@ -236,8 +236,14 @@ fn left(fitted: &Fitted, model: &Posterior) -> f64 {
     fitted.problem.misfit(&model.mechanism) - fitted.problem.len() as f64
 }
 
-/// Whether a rival says the same as the leader with no more parameters.
+/// Whether a rival says the same as the leader: with no more parameters, or as the same cause by another name
+/// (a tilt and a cross-talk differ in the second order, where neither's form is known).
 fn same_said(fitted: &Fitted, leader: usize, rival: usize) -> bool {
+    let names = [leader, rival].map(|i| fitted.candidates[i].names());
+    let alike = |a: &str, b: &str| a == b || one_cause(a, b);
+    if names[0].iter().all(|a| names[1].iter().any(|b| alike(a, b))) {
+        return true;
+    }
     let [a, b] = [leader, rival].map(|i| &fitted.candidates[i].best);
     let apart = fitted.problem.chi2(&(&a.mechanism - &b.mechanism));
     b.u.len() <= a.u.len() && apart < fitted.problem.constants.same_forces_chi2

@@ -94,7 +94,7 @@ pub fn description(fitted: &Fitted, decision: &Decision) -> Vec<Description> {
 }
 
 /// Causes that are sure though the verdict is open: those of which the hypotheses together have the
-/// probability of a name.
+/// probability of a name, and that none of the hypotheses lacks which the table does not tell from the leader.
 pub fn at_least(fitted: &Fitted, decision: &Decision) -> Vec<String> {
     if !matches!(decision.verdict, Verdict::Ambiguous | Verdict::Unknown) {
         return Vec::new();
@@ -103,8 +103,13 @@ pub fn at_least(fitted: &Fitted, decision: &Decision) -> Vec<String> {
         let with = fitted.candidates.iter().zip(&decision.probabilities);
         with.filter(|(c, _)| c.effects.contains(&effect)).map(|(_, p)| p).sum()
     };
-    let sure = fitted.problem.constants.name_probability;
+    let name = fitted.problem.constants.name_probability;
+    let open = decision.verdict == Verdict::Ambiguous;
+    let lacked = |effect: usize| {
+        open && decision.class.iter().any(|&i| !fitted.candidates[i].effects.contains(&effect))
+    };
     let tried: std::collections::BTreeSet<usize> =
         fitted.candidates.iter().flat_map(|c| c.effects.iter().copied()).collect();
-    tried.into_iter().filter(|&e| of(e) >= sure).map(|e| effects::at(e).name.to_string()).collect()
+    let sure = |e: &usize| of(*e) >= name && !lacked(*e);
+    tried.into_iter().filter(sure).map(|e| effects::at(e).name.to_string()).collect()
 }
