@@ -94,7 +94,7 @@ pub fn description(fitted: &Fitted, decision: &Decision) -> Vec<Description> {
 }
 
 /// Causes that are sure though the verdict is open: those of which the hypotheses together have the
-/// probability of a name, and that none of the hypotheses lacks which the table does not tell from the leader.
+/// probability of a name, and that no hypothesis lacks which the table does not tell from the leader.
 pub fn at_least(fitted: &Fitted, decision: &Decision) -> Vec<String> {
     if !matches!(decision.verdict, Verdict::Ambiguous | Verdict::Unknown) {
         return Vec::new();

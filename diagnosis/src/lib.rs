@@ -22,6 +22,7 @@
 //! | [`shrinkage`], [`predict`], [`novelty`], `run_shifts` | held-out passes; predictions, also in runs |
 //! | [`next`], [`power`] | the experiment that separates the leading hypotheses; detectable sizes |
 //! | [`reading`] | which reading of the paper's w the passes favour |
+//! | [`unstated`] | what conditions must state before the verdict's model predicts them |
 //! | [`describe`] | what an unknown departure looks like; causes that are sure all the same |
 //! | [`timing`] | what the edges in a run's record say of lags and shifts in time |
 //! | [`verdict`], [`document`], [`remarks`], [`certificates`], [`saved`] | report, JSON, remarks, model |

@@ -197,7 +197,7 @@ fn beside_a_function(problem: &Problem, singles: &[Candidate], loose: &[f64], ba
     found.collect()
 }
 
-/// Places of pairs by a coarse scan: each of the seeds with every other effect in each of its laws, best first.
+/// Places of pairs by a coarse scan, best first: each seed with every other effect in each of its laws.
 fn coarse_starts(problem: &Problem, seeds: &[Candidate], singles: &[Candidate], loose: &[f64]) -> Vec<Start> {
     let k = &problem.constants;
     let jobs: Vec<(usize, &Posterior)> = (0..seeds.len())

@@ -33,10 +33,10 @@ fn a_cause_of_data_sheets_is_named() {
     named(&["ridge_inertia", "adhesion", "speed_error"]);
 }
 
-/// A stiffness that follows the pad's angle along the plate (sixth_generator.py, `--seed 61112801`, set 114) was
-/// a pair with a standing wave, a zero tared before each run and a vibrometer's next range (fifth_generator.py,
-/// `--seed 51112902`, sets 58 and 0) were ambiguous and `unknown`, before sizes could be functions of the place
-/// and functions of time others in each run.
+/// A stiffness that follows the pad's angle along the plate (sixth_generator.py, `--seed 61112801`, set 114)
+/// was a pair with a standing wave; a zero tared before each run and a vibrometer's next range
+/// (fifth_generator.py, `--seed 51112902`, sets 58 and 0) were ambiguous and `unknown`. Sizes were no
+/// functions of the place then, and functions of time no others in each run.
 #[test]
 fn a_cause_whose_size_goes_with_the_place_or_the_run_is_named() {
     named(&["stiffness_error", "lateral_offset_drift", "amplitude_miscalibration"]);

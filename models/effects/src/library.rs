@@ -23,8 +23,8 @@ mod prelude {
     /// Growth as a sensor or a mount yields under the load.
     pub const LOADED: Parameter = Parameter::signed("growth_with_load", "1", 0.3, -0.9, 2.0).bending();
 
-    /// Share of what the vibration does at the largest amplitude and the reference frequency: by a power of the
-    /// amplitude and one of the frequency.
+    /// What the vibration does as a share of that at the largest amplitude and the reference frequency: by
+    /// powers of both.
     pub fn vibrating(exponents: &[f64], pass: &Condition, design: &Design) -> f64 {
         let amplitude = pass.amplitude.metres() / design.largest_amplitude_m.max(1e-12);
         let frequency = pass.frequency_hz / design.reference_frequency_hz;

@@ -22,8 +22,8 @@ pub enum Bonds {
         share: f64,
     },
     /// The limit grows by the logarithm of the junctions' age, and sliding renews them (ageing law; Dieterich
-    /// 1979, Ruina 1983): `1 + strength ln((age + time)/(steady + time))` of that in steady sliding, at an age
-    /// of `steady (1 - exp(-t/steady))`.
+    /// 1979, Ruina 1983): `1 + strength ln((age + time)/(steady + time))` of that in steady sliding, where
+    /// the age is `steady (1 - exp(-t/steady))`.
     Renewed {
         /// Growth for a factor of e of the age.
         strength: f64,

@@ -7,8 +7,9 @@ pub(super) static EFFECT: Effect = Effect {
     place: Location::Instrument,
     summary: "A component of the load is read as lateral force, and one of the friction as normal force.",
     source: "rotation of the frame by the angle: Fx' = Fx cos + Fz sin, Fz' = Fz cos - Fx sin",
-    // A plate is bowed, and its mount yields under the load, or creeps. A plate that turns shows in both axes. A lateral
-    // cell that is askew by itself reads a share of the normal force: that is a cross-talk by its definition.
+    // A plate is bowed, and its mount yields under the load, or creeps. A plate that turns shows in both
+    // axes. A lateral cell that is askew by itself reads a share of the normal force: that is a cross-talk by
+    // its definition.
     laws: &[Law::new(
         "rotation",
         &[Parameter::signed("angle", "rad", 0.03, -0.3, 0.3), ALONG, LOADED, LATER],

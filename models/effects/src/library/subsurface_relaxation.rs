@@ -11,7 +11,7 @@ pub(super) static EFFECT: Effect = Effect {
     summary: "Creep of the soft tissue changes the stiffness of the contact with time, not its friction coefficient.",
     source: "longest relaxation time of a finger pad about 3 s (the paper's introduction); area grows as log t",
     laws: &[
-        // Tissue has no single relaxation time: Kohlrausch's function, the usual one for a broad spectrum of times.
+        // Tissue has no single relaxation time: Kohlrausch's function, usual for a broad spectrum of times.
         Law::new(
             "stretched exponential creep",
             &[
