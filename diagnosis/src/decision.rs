@@ -83,11 +83,13 @@ pub fn decide(fitted: &mut Fitted) -> Decision {
     }
     let mut class = alias_class(fitted, leader);
     let departed = departed_singles(fitted, leader);
+    let renamed = renamed(fitted, leader, &class);
     let alone = k.alone_share[usize::from(candidates[leader].effects.len() > 1)];
     // Priors alone make no name: a rival whose forces are the same must differ in the data.
     let distinct = imitated(&candidates[leader].names()).is_none()
         && class[1..].iter().all(|&i| !same_said(fitted, leader, i))
-        && departed.is_empty();
+        && departed.is_empty()
+        && renamed.is_empty();
     class.extend(departed);
     let of = |class: &[usize], p: &[f64]| class.iter().map(|&i| p[i]).sum::<f64>();
     // Half of the gap at least, whatever the evidence says.
@@ -104,6 +106,7 @@ pub fn decide(fitted: &mut Fitted) -> Decision {
     } else {
         Verdict::Ambiguous
     };
+    class.extend(renamed.into_iter().filter(|_| verdict == Verdict::Ambiguous));
     Decision { verdict, none, unknown, probabilities, class, gate: judged, regions }
 }
 
@@ -236,14 +239,21 @@ fn left(fitted: &Fitted, model: &Posterior) -> f64 {
     fitted.problem.misfit(&model.mechanism) - fitted.problem.len() as f64
 }
 
-/// Whether a rival says the same as the leader: with no more parameters, or as the same cause by another name
-/// (a tilt and a cross-talk differ in the second order, where neither's form is known).
+/// The leader by another name, where the data hardly tell which: a tilt and a cross-talk differ in the second
+/// order, where neither's form is known.
+fn renamed(fitted: &Fitted, leader: usize, class: &[usize]) -> Vec<usize> {
+    let own = &fitted.candidates[leader];
+    let alike = |c: &Candidate| {
+        let same = |a: &str| c.names().iter().any(|b| a == *b || one_cause(a, b));
+        c.effects.len() == own.effects.len() && own.names().iter().all(|a| same(a))
+    };
+    let near = |c: &Candidate| own.log_evidence - c.log_evidence < fitted.problem.constants.prior_nats;
+    let all = fitted.candidates.iter().enumerate();
+    all.filter(|(i, c)| !class.contains(i) && near(c) && alike(c)).map(|(i, _)| i).collect()
+}
+
+/// Whether a rival says the same as the leader with no more parameters.
 fn same_said(fitted: &Fitted, leader: usize, rival: usize) -> bool {
-    let names = [leader, rival].map(|i| fitted.candidates[i].names());
-    let alike = |a: &str, b: &str| a == b || one_cause(a, b);
-    if names[0].iter().all(|a| names[1].iter().any(|b| alike(a, b))) {
-        return true;
-    }
     let [a, b] = [leader, rival].map(|i| &fitted.candidates[i].best);
     let apart = fitted.problem.chi2(&(&a.mechanism - &b.mechanism));
     b.u.len() <= a.u.len() && apart < fitted.problem.constants.same_forces_chi2

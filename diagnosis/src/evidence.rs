@@ -245,8 +245,8 @@ pub fn averaged_over_form(
     if most >= large {
         list.push((from(Freedom::share(large), third), three));
     }
-    // Of two causes either's size may hide what the other does.
-    let sizes = (members.len() == 1).then_some((Bends::Size, five));
+    // Of two causes either's size may hide what the other does; a linear map of the readings is one.
+    let sizes = (members.len() == 1 && most >= medium).then_some((Bends::Size, five));
     for (bends, weight) in [(Bends::Input, four)].into_iter().chain(sizes) {
         if basis.bends(members, bends) {
             let bent = Freedom { share: middle.freedom.share, bend: k.bend_share, bends };

@@ -8,8 +8,6 @@ const CHECK: &str = "Measure the plate with a vibrometer at three drives.";
 /// Below this share of the largest amplitude a gain changes no further; beyond these e-folds it is none.
 const LEAST_AMPLITUDE: f64 = 0.05;
 const MOST_E_FOLDS: f64 = 2.0;
-/// Width of a change of range, as a share of the largest amplitude.
-const RANGE_WIDTH: f64 = 0.02;
 
 pub(super) static EFFECT: Effect = Effect {
     name: "amplitude_miscalibration",
@@ -34,16 +32,6 @@ pub(super) static EFFECT: Effect = Effect {
             ],
         )
         .seen_by(CHECK, 0.02),
-        // A vibrometer's next range. One that began at the largest amplitudes would be a drive at its limit.
-        Law::new(
-            "another gain above an amplitude",
-            &[
-                Parameter::signed("log_gain_above", "1", 0.3, -1.5, 1.5),
-                Parameter::between("from_share_of_largest", "1", 0.1, 0.6),
-            ],
-        )
-        .needs(&[Need::Amplitudes])
-        .seen_by(CHECK, 0.02),
     ],
     acts: Some(Acts { on: Input::Amplitude, over: &[&covariate::AMPLITUDE] }),
     needs: &[Need::Vibration],
@@ -51,20 +39,15 @@ pub(super) static EFFECT: Effect = Effect {
         if c.amplitude_pp <= 0.0 {
             return;
         }
-        let amplitude = || c.amplitude_pp / design.largest_amplitude_m.max(1e-12);
         match law {
             0 => c.amplitude_pp *= theta[0].exp(),
             1 => c.amplitude_pp = (c.amplitude_pp - theta[0]).max(0.0),
-            2 => {
-                let amplitude = amplitude().max(LEAST_AMPLITUDE).ln();
+            _ => {
+                let amplitude =
+                    (c.amplitude_pp / design.largest_amplitude_m.max(1e-12)).max(LEAST_AMPLITUDE).ln();
                 let frequency = (c.frequency / design.reference_frequency_hz).ln();
                 let log_gain = theta[0] * (1.0 + theta[1] * frequency) * (1.0 + theta[2] * amplitude);
                 c.amplitude_pp *= log_gain.clamp(-MOST_E_FOLDS, MOST_E_FOLDS).exp();
-            }
-            _ => {
-                // Hardly blurred, so that a fit sees which way to go.
-                let above = 1.0 / (1.0 + ((theta[1] - amplitude()) / RANGE_WIDTH).exp());
-                c.amplitude_pp *= (theta[0] * above).exp();
             }
         }
     },
