@@ -59,7 +59,7 @@ pub(super) static EFFECT: Effect = Effect {
             &[
                 Parameter::signed("gradient", "1/m", 10.0, -60.0, 60.0),
                 // A near field dies away from an edge or a clamp.
-                Parameter::signed("curvature", "1/m^2", 800.0, -1e4, 1e4).bending(),
+                Parameter::signed("curvature_over_gradient", "1", 0.7, -3.0, 3.0).bending(),
             ],
         )
         .seen_by(CHECK, 1.0),
@@ -84,8 +84,9 @@ pub(super) static EFFECT: Effect = Effect {
                 (1.0 - depth * (1.0 - ring * ring)).max(LEAST_SQUARE).sqrt() * (depth * theta[4]).exp()
             }
             _ => {
-                let (x, half) = (x - 0.5 * design.stroke_m, 0.5 * design.stroke_m);
-                (theta[0] * x + theta[1] * (x * x - half * half / 3.0)).clamp(-2.0, 2.0).exp()
+                let half = (0.5 * design.stroke_m).max(1e-9);
+                let x = x - half;
+                (theta[0] * (x + theta[1] * (x * x / half - half / 3.0))).clamp(-2.0, 2.0).exp()
             }
         };
     },
