@@ -128,14 +128,16 @@ fn bent(fitted: &Fitted, decision: &Decision) -> Option<String> {
         let name = effect.name.replace('_', " ");
         let over = effect.acts.map_or(&[][..], |acts| acts.over).iter().map(|c| c.words);
         match leader.best.freedom.bends {
-            Bends::Input => format!("{name} as a function of {}", over.collect::<Vec<_>>().join(" and ")),
-            Bends::Size => format!("{name} whose size goes with the place or the weather,"),
+            Bends::Input => {
+                format!("{name} as a function of {} of a free form", over.collect::<Vec<_>>().join(" and "))
+            }
+            Bends::Size => format!("{name} whose size goes with the place or the weather"),
         }
     });
     let of: Vec<String> = of.collect();
     (nats > BENT_NATS).then(|| {
         format!(
-            "The table speaks against the library's law: {} of a free form explains it better, by {nats:.0} nats. \
+            "The table speaks against the library's law: {} explains it better, by {nats:.0} nats. \
              Predictions follow that form. Parameters, their intervals and the saved model are those of the library's \
              law.",
             of.join(" and ")
