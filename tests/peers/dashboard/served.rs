@@ -131,6 +131,17 @@ impl Paced {
         Paced { signals, runs: Some(runs) }
     }
 
+    /// Waits until so many passes are on disk.
+    pub fn await_passes(&self, out: &Path, least: usize) {
+        let began = Instant::now();
+        let made =
+            || std::fs::read_to_string(out.join("passes.jsonl")).map_or(0, |text| text.lines().count());
+        while made() < least {
+            assert!(began.elapsed().as_secs() < 300, "no {least} passes after five minutes");
+            std::thread::sleep(Duration::from_millis(50));
+        }
+    }
+
     pub fn passes(mut self) -> usize {
         self.signals.stops.store(1, Ordering::Relaxed);
         self.runs.take().unwrap().join().unwrap()
