@@ -77,8 +77,10 @@ impl Change {
         let Recalibration { raw, jacobian, .. } = recalibrated;
         let mut bent = Vec::new();
         for (i, member) in members.iter().enumerate().filter(|_| freedom.bend > 0.0) {
-            let slope = slope(problem, members, u, prediction, (i, freedom.bends));
-            let (Some(slope), Some(_)) = (slope, basis.of(member.effect, freedom.bends)) else { continue };
+            if basis.of(member.effect, freedom.bends).is_none() {
+                continue;
+            }
+            let Some(slope) = slope(problem, members, u, prediction, (i, freedom.bends)) else { continue };
             let own = match members.len() {
                 1 => raw.clone(),
                 _ => prediction - without(problem, members, u, i),

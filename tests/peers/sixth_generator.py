@@ -212,7 +212,7 @@ FORM_TABLE = [
      lambda m, s, n: dict(w=m.w * np.tanh(
          z := np.maximum(s * m.w / (2 * UM) * (KHZ30 / m.f) ** n, 1e-6)) / z)),
     ("plate", "resonance_detuning", "clamped_anew", 0.2, 10.0, 1, [(0, 9999), (0.0, 0.8)], "runs",
-     "clamped anew before each run, and the bolt's torque moves the resonance (Arnold and Muehlen 2001)",
+     "clamped again before each run, and the bolt's torque moves the resonance (Arnold and Muehlen 2001)",
      lambda m, s, mark, b: off_peak(m, s * (b + chance(mark, m.run.max() + 1)[m.run]))),
     ("plate", "resonance_detuning", "lagging_tracker", 0.1, 40.0, 1, [(40, 250), (-0.3, 0.3)],
      "temperature time", "a slow loop lags behind the warming plate (Gardner, Phaselock Techniques, 2005)",
