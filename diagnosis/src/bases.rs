@@ -147,6 +147,11 @@ fn size_lengths(k: &Constants, place: bool) -> Lengths {
     Lengths { condition: far, time: far, position, climate, seen: [true; COUNT] }
 }
 
+/// A linear map of the readings: what is linear in its size departs from no form.
+fn is_linear_map(effect: usize) -> bool {
+    effects::at(effect).departs_by < 1.0
+}
+
 /// Whether the size of an effect may go with the place: not where another effect of the library is that.
 pub(crate) fn goes_with_place(effect: usize) -> bool {
     !effects::at(effect).acts.is_some_and(|acts| matches!(acts.on, Input::Amplitude | Input::Speed))
@@ -193,6 +198,7 @@ impl Basis {
     pub(crate) fn of(&self, effect: usize, bends: Bends) -> Option<&DMatrix<f64>> {
         match bends {
             Bends::Input => self.bends.iter().find(|(e, _)| *e == effect).map(|(_, basis)| basis),
+            Bends::Size if is_linear_map(effect) => None,
             Bends::Size => self.sizes[usize::from(goes_with_place(effect))].as_ref(),
         }
     }

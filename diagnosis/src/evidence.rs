@@ -245,9 +245,7 @@ pub fn averaged_over_form(
     if most >= large {
         list.push((from(Freedom::share(large), third), three));
     }
-    // Of two causes either's size may hide what the other does; a linear map of the readings is one.
-    let sizes = (members.len() == 1 && most >= medium).then_some((Bends::Size, five));
-    for (bends, weight) in [(Bends::Input, four)].into_iter().chain(sizes) {
+    for (bends, weight) in [(Bends::Input, four), (Bends::Size, five)] {
         if basis.bends(members, bends) {
             let bent = Freedom { share: middle.freedom.share, bend: k.bend_share, bends };
             list.push((from(bent, second), weight));

@@ -191,7 +191,7 @@ fn beside_a_function(problem: &Problem, singles: &[Candidate], loose: &[f64], ba
     starts.truncate(k.pairs_searched);
     let found = starts.into_par_iter().filter_map(|start| {
         let fit = refine_from(&rest, &start.members, start.u, loose)?;
-        let bent = Freedom { bend: k.bend_share, ..middle_freedom(k, &start.members) };
+        let bent = Freedom { share: middle_freedom(k, &start.members).share, ..leader.freedom };
         Some(Pair::of(laplace(problem, &start.members, &fit.u, basis, bent, ROUNDS[0])))
     });
     found.collect()
@@ -266,10 +266,15 @@ pub fn pairs(problem: &Problem, singles: &[Candidate], loose: &[f64], basis: &Ba
 fn weighed(problem: &Problem, pairs: Vec<Pair>, basis: &Basis) -> Vec<Candidate> {
     let k = &problem.constants;
     let top = pairs.iter().map(|p| p.posterior.log_evidence).fold(f64::NEG_INFINITY, f64::max);
+    // By their laws the best pairs may be far behind a bent one, and not where they are bent too.
+    let mut by_law: Vec<f64> =
+        pairs.iter().filter(|p| p.posterior.freedom.bend == 0.0).map(|p| p.posterior.log_evidence).collect();
+    by_law.sort_by(|a, b| b.total_cmp(a));
+    let nth = by_law.get(k.pair_seeds).copied().unwrap_or(f64::NEG_INFINITY);
     let weighed: Vec<(Vec<usize>, f64, Posterior)> = pairs
         .into_par_iter()
         .map(|Pair { effects, posterior: e }| {
-            if e.log_evidence > top - k.prune_nats {
+            if e.log_evidence > nth.min(top - k.prune_nats) {
                 let fit = Fit { u: e.u.clone(), prediction: e.prediction.clone(), cost: 0.0 };
                 let (evidence, best) = averaged_over_form(problem, &fit, &e.members, basis);
                 (effects, evidence, best)

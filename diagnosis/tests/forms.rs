@@ -41,6 +41,13 @@ fn a_cause_whose_size_goes_with_the_place_or_the_run_is_named() {
     named(&["stiffness_error", "lateral_offset_drift"]);
 }
 
+/// Sweat that comes as the skin warms, in skin that relaxes (sixth_generator.py, `--seed 61112902`, set 12):
+/// ambiguous, while the size of a pair's member was no function of the weather.
+#[test]
+fn a_pair_of_which_a_size_goes_with_the_weather_is_named() {
+    named(&["moisture_drift+subsurface_relaxation"]);
+}
+
 /// A plate of rings with a pick-up that has a floor (`--seed 36113231`, set 122): one law of rings with a
 /// function beside it leaves no more than scatter does, and was named alone. By its law it leaves 17
 /// deviations, and two causes are 44 nats ahead.
