@@ -2,6 +2,7 @@
 //! docs/diagnosis/model.md, section 5.
 
 use crate::constants::Constants;
+use crate::data::Table;
 use crate::fit::Problem;
 use crate::kernel::{COUNT, Coordinates, Kernel, Lengths, form_lengths};
 use crate::member::Member;
@@ -27,6 +28,8 @@ pub enum Bends {
 #[derive(Debug, Clone)]
 pub struct Kernels {
     coordinates: Coordinates,
+    /// With the weather that goes with time too: sizes do not go over time.
+    weather: Coordinates,
     largest_amplitude: f64,
     smooth: (Lengths, Kernel),
     /// By effect; without those whose covariates do not change in the table.
@@ -59,14 +62,16 @@ fn at_start(p: &Condition, by_run: bool) -> Condition {
 
 impl Kernels {
     /// The kernels on a table's passes, for these effects.
-    pub fn on(problem: &Problem, coordinates: Coordinates, effects: &[usize]) -> Self {
+    pub fn on(problem: &Problem, table: &Table, effects: &[usize]) -> Self {
         let k = &problem.constants;
         let largest = problem.design.largest_amplitude_m;
-        let kernel = |lengths: &Lengths, by_run: bool| {
+        let (coordinates, weather) = (Coordinates::of(table), Coordinates::with_weather(table));
+        let over = |coordinates: &Coordinates, lengths: &Lengths, by_run: bool| {
             let place = |p: &Condition| coordinates.place(&at_start(p, by_run), largest, lengths);
             let places: Vec<_> = problem.passes.iter().map(place).collect();
             Kernel::new(&places, k.form_rank, k.kernel_rest)
         };
+        let kernel = |lengths: &Lengths, by_run: bool| over(&coordinates, lengths, by_run);
         let smooth = form_lengths(k);
         let smooth = (smooth, kernel(&smooth, false));
         let bends = effects.iter().filter_map(|&effect| Some((effect, effects::at(effect).acts?)));
@@ -82,14 +87,14 @@ impl Kernels {
         let bends = bends.filter(|bend| bend.kernel.rank() > 1).collect();
         let sizes = [false, true].map(|place| {
             let lengths = size_lengths(k, place);
-            Some((lengths, kernel(&lengths, false))).filter(|(_, kernel)| kernel.rank() > 1)
+            Some((lengths, over(&weather, &lengths, false))).filter(|(_, kernel)| kernel.rank() > 1)
         });
-        Kernels { largest_amplitude: largest, smooth, bends, sizes, coordinates }
+        Kernels { largest_amplitude: largest, smooth, bends, sizes, coordinates, weather }
     }
 
-    /// Temperature and humidity, where the smooth functions go over them.
+    /// Temperature and humidity, where sizes go over them.
     pub fn climate(&self) -> impl Iterator<Item = &'static Covariate> + '_ {
-        self.coordinates.climate()
+        self.weather.climate()
     }
 
     /// Their bases at passes.
@@ -103,8 +108,8 @@ impl Kernels {
     }
 
     fn of(&self, passes: &[Condition], needed: impl Fn(usize) -> bool) -> Basis {
-        let basis = |(lengths, kernel): &(Lengths, Kernel)| {
-            let place = |p: &Condition| self.coordinates.place(p, self.largest_amplitude, lengths);
+        let basis = |coordinates: &Coordinates, (lengths, kernel): &(Lengths, Kernel)| {
+            let place = |p: &Condition| coordinates.place(p, self.largest_amplitude, lengths);
             kernel.matrix(&passes.iter().map(place).collect::<Vec<_>>())
         };
         let mut bends: Vec<(usize, DMatrix<f64>)> = Vec::new();
@@ -120,9 +125,9 @@ impl Kernels {
             }
         }
         Basis {
-            smooth: basis(&self.smooth),
+            smooth: basis(&self.coordinates, &self.smooth),
             bends,
-            sizes: self.sizes.each_ref().map(|of| of.as_ref().map(basis)),
+            sizes: self.sizes.each_ref().map(|of| of.as_ref().map(|of| basis(&self.weather, of))),
         }
     }
 }

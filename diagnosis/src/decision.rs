@@ -95,13 +95,15 @@ pub fn decide(fitted: &mut Fitted) -> Decision {
     // Half of the gap at least, whatever the evidence says.
     let closes = judged.pooled >= k.region_closed;
     let leads = closes && probabilities[leader] >= alone * of(&class, &probabilities);
+    let whole = leaves_sd(fitted, &candidates[leader].best)
+        < k.name_leaves_sd[usize::from(candidates[leader].effects.len() > 1)];
     let (none, unknown) = doubted(fitted, none, unknown, &mut probabilities);
     let in_class = of(&class, &probabilities);
     let verdict = if !claimed || none >= in_class.max(unknown) {
         Verdict::NoGap
     } else if unknown >= in_class {
         Verdict::Unknown
-    } else if distinct && leads && in_class >= k.name_probability {
+    } else if distinct && leads && whole && in_class >= k.name_probability {
         Verdict::Named
     } else {
         Verdict::Ambiguous
@@ -186,9 +188,10 @@ fn alias_class(fitted: &Fitted, leader: usize) -> Vec<usize> {
     class
 }
 
-/// Members of a leading pair that may be the only cause, with a form of their own: the evidence for the
-/// second is small, and a smooth departure from the library's form, as large as known forms depart, leaves
-/// little of the gap. Such a second cause cannot be separated from another form of the first.
+/// Members of a leading pair that may be the only cause, with a form of their own: alone one leaves no misfit
+/// where its size is a function of place or weather; or the evidence for the second is small, and a smooth
+/// departure from the library's form, as large as known forms depart, leaves little of the gap. Such a second
+/// cause cannot be separated from another form of the first.
 fn departed_singles(fitted: &Fitted, leader: usize) -> Vec<usize> {
     let candidates = &fitted.candidates;
     let (k, own) = (&*fitted.problem.constants, &candidates[leader]);
@@ -197,8 +200,10 @@ fn departed_singles(fitted: &Fitted, leader: usize) -> Vec<usize> {
     }
     let gap = left(fitted, &fitted.none);
     let might = |i: usize| {
-        own.log_evidence - candidates[i].log_evidence < k.pair_own_form_nats
-            && left_by_a_form_of_its_own(fitted, &candidates[i]) < k.pair_departure.powi(2) * gap
+        let best = &candidates[i].best;
+        best.freedom.bend > 0.0 && best.freedom.bends == Bends::Size && leaves_sd(fitted, best) < k.misfit_sd
+            || own.log_evidence - candidates[i].log_evidence < k.pair_own_form_nats
+                && left_by_a_form_of_its_own(fitted, &candidates[i]) < k.pair_departure.powi(2) * gap
     };
     (0..candidates.len())
         .filter(|&i| candidates[i].effects.len() == 1 && own.effects.contains(&candidates[i].effects[0]))
@@ -237,6 +242,11 @@ fn left_by_a_form_of_its_own(fitted: &Fitted, cause: &Candidate) -> f64 {
 /// chi2 that a model leaves beyond scatter.
 fn left(fitted: &Fitted, model: &Posterior) -> f64 {
     fitted.problem.misfit(&model.mechanism) - fitted.problem.len() as f64
+}
+
+/// The same in deviations of chi2.
+fn leaves_sd(fitted: &Fitted, model: &Posterior) -> f64 {
+    left(fitted, model) / (2.0 * fitted.problem.len() as f64).sqrt()
 }
 
 /// The leader by another name, where the data hardly tell which: a tilt and a cross-talk differ in the second
@@ -304,7 +314,6 @@ fn says_as_much(fitted: &Fitted, pair: usize, gap: f64) -> Vec<usize> {
     let candidates = &fitted.candidates;
     let own = &candidates[pair];
     let own_left = left(fitted, &own.best);
-    let scatter = (2.0 * problem.len() as f64).sqrt();
     let as_much = |i: &usize| {
         let c = &candidates[*i];
         if c.effects.len() != 1 || !own.effects.contains(&c.effects[0]) {
@@ -312,10 +321,10 @@ fn says_as_much(fitted: &Fitted, pair: usize, gap: f64) -> Vec<usize> {
         }
         let gain = own.log_evidence - c.log_evidence;
         let c_left = left(fitted, &c.best);
-        let misfit = c_left > k.misfit_sd * scatter;
+        let misfit = leaves_sd(fitted, &c.best) > k.misfit_sd;
         let needed = misfit && own_left < k.pair_halves * c_left && gain > k.pair_nats;
         // Or the pair leaves nothing that the scatter does not, and the single cause does.
-        let complete = misfit && own_left < k.pair_complete_sd * scatter;
+        let complete = misfit && leaves_sd(fitted, &own.best) < k.pair_complete_sd;
         let large = 2.0 * gain >= k.pair_gain_share * gap;
         let pulled = c.best.pull() > own.best.pull() + k.pair_pull_chi2;
         !(pulled || needed || gain > k.pair_least_nats && (large || complete))

@@ -194,7 +194,6 @@ mod tests {
     use crate::data::Table;
     use crate::evidence::{averaged_over_form, laplace};
     use crate::example::{Deviates, rig, table};
-    use crate::kernel::Coordinates;
     use crate::least_squares::minimise;
     use effects::{Baseline, by_name};
     use models::condition::Condition;
@@ -232,7 +231,7 @@ mod tests {
         let effect = (0..effects::library().len())
             .find(|&e| effects::library()[e].name == by_name("resonance_detuning").map_or("", |e| e.name))
             .unwrap();
-        let kernels = Kernels::on(&problem, Coordinates::of(&table), &[effect]);
+        let kernels = Kernels::on(&problem, &table, &[effect]);
         let basis = kernels.at(&problem.passes);
         let members = [Member { effect, law: 5 }];
         let start = [0.0, 0.0, 0.0, 0.3, 0.0, 0.5, 0.0, 0.0, 0.0];

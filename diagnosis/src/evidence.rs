@@ -272,7 +272,6 @@ mod tests {
     use super::*;
     use crate::bases::Kernels;
     use crate::example::{Deviates, rig, table};
-    use crate::kernel::Coordinates;
     use crate::least_squares::minimise;
 
     /// Without a gap a law can gain no more than its best size does: at size zero its shapes change nothing,
@@ -283,7 +282,7 @@ mod tests {
         let mut problem = Problem::new(&table, &rig(), &Default::default());
         crate::noise::settle(&table, &rig(), &mut problem, &crate::scatter::Belief::Judged);
         let all: Vec<usize> = (0..effects::library().len()).collect();
-        let basis = Kernels::on(&problem, Coordinates::of(&table), &all).at(&problem.passes);
+        let basis = Kernels::on(&problem, &table, &all).at(&problem.passes);
         let none = minimise(&problem, &[], &[0.0; NUISANCES], &problem.variance, 15);
         let none = laplace(&problem, &[], &none.u, &basis, Freedom::NONE, 4);
         let mut tried = 0;

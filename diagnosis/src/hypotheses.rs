@@ -8,7 +8,6 @@ use crate::evidence::{Posterior, averaged_over_form};
 use crate::fit::Problem;
 pub use crate::fitted::{Candidate, Fitted};
 use crate::gaussian::log_sum_exp;
-use crate::kernel::Coordinates;
 use crate::law::Law;
 use crate::layout::{Layout, NUISANCES};
 use crate::least_squares::minimise;
@@ -109,7 +108,7 @@ pub fn fit_believing(table: &Table, rig: &RigFile, options: &Options, belief: &B
 
     problem.own = tried.iter().copied().filter(|e| options.own.contains(e)).collect();
     let known: Vec<usize> = tried.iter().copied().chain(library().len()..effects::known().len()).collect();
-    let kernels = Kernels::on(&problem, Coordinates::of(table), &known);
+    let kernels = Kernels::on(&problem, table, &known);
     let basis = kernels.at(&problem.passes);
     let search = Search { nuisances: &nuisances, loose: &loose, basis: &basis, progress };
     let mut candidates = singles(&problem, table, &tried, &search);

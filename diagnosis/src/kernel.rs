@@ -66,8 +66,18 @@ pub(crate) const COUNT: usize = SMOOTH.len();
 const OF_ITS_OWN: f64 = 0.5;
 
 impl Coordinates {
-    /// Mean and deviation of each covariate over the table. One that some passes lack is left out.
+    /// Mean and deviation of each covariate over the table. One that some passes lack is left out, and weather
+    /// that is time by another name.
     pub fn of(table: &Table) -> Self {
+        Self::from(table, OF_ITS_OWN)
+    }
+
+    /// The same with all weather that changes, for functions that do not go over time.
+    pub fn with_weather(table: &Table) -> Self {
+        Self::from(table, 0.0)
+    }
+
+    fn from(table: &Table, of_its_own: f64) -> Self {
         let n = table.len() as f64;
         let largest = table.design.largest_amplitude_m;
         let mut mean = [0.0; COUNT];
@@ -79,10 +89,10 @@ impl Coordinates {
             mean[k] = values.iter().sum::<f64>() / n;
             sd[k] = (values.iter().map(|v| (v - mean[k]).powi(2)).sum::<f64>() / n).sqrt();
             let own = match c.role {
-                Role::Climate => without_time(table, &values),
+                Role::Climate if of_its_own > 0.0 => without_time(table, &values),
                 _ => sd[k],
             };
-            if own < c.least_spread || own < OF_ITS_OWN * sd[k] {
+            if own < c.least_spread || own < of_its_own * sd[k] {
                 sd[k] = 0.0;
             }
         }
