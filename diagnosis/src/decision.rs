@@ -35,6 +35,8 @@ pub struct Decision {
     pub probabilities: Vec<f64>,
     /// Indices of the leader's alias class among the candidates, the leader first; empty where no effect could be tried.
     pub class: Vec<usize>,
+    /// Deviations of chi2 that the leader leaves, where that alone keeps it from a name.
+    pub misfit: Option<f64>,
     /// What the left-out regions say about the leader.
     pub gate: Gate,
     /// Those regions.
@@ -67,7 +69,7 @@ pub fn decide(fitted: &mut Fitted) -> Decision {
         let k = &fitted.problem.constants;
         let verdict = if none < k.claim_probability { Verdict::Unknown } else { Verdict::NoGap };
         let (class, regions, gate) = (Vec::new(), Vec::new(), gate(k, &[]));
-        return Decision { verdict, none, unknown, probabilities, class, gate, regions };
+        return Decision { verdict, none, unknown, probabilities, class, misfit: None, gate, regions };
     };
     let claimed = none < fitted.problem.constants.claim_probability;
     let (regions, judged, survival) = judged(fitted, leader, claimed);
@@ -95,21 +97,23 @@ pub fn decide(fitted: &mut Fitted) -> Decision {
     // Half of the gap at least, whatever the evidence says.
     let closes = judged.pooled >= k.region_closed;
     let leads = closes && probabilities[leader] >= alone * of(&class, &probabilities);
-    let whole = leaves_sd(fitted, &candidates[leader].best)
-        < k.name_leaves_sd[usize::from(candidates[leader].effects.len() > 1)];
+    let leaves = leaves_sd(fitted, &candidates[leader].best);
+    let whole = leaves < k.name_leaves_sd[usize::from(candidates[leader].effects.len() > 1)];
     let (none, unknown) = doubted(fitted, none, unknown, &mut probabilities);
     let in_class = of(&class, &probabilities);
+    let name = distinct && leads && in_class >= k.name_probability;
     let verdict = if !claimed || none >= in_class.max(unknown) {
         Verdict::NoGap
     } else if unknown >= in_class {
         Verdict::Unknown
-    } else if distinct && leads && whole && in_class >= k.name_probability {
+    } else if name && whole {
         Verdict::Named
     } else {
         Verdict::Ambiguous
     };
     class.extend(renamed.into_iter().filter(|_| verdict == Verdict::Ambiguous));
-    Decision { verdict, none, unknown, probabilities, class, gate: judged, regions }
+    let misfit = (verdict == Verdict::Ambiguous && name).then_some(leaves);
+    Decision { verdict, none, unknown, probabilities, class, misfit, gate: judged, regions }
 }
 
 /// Probabilities with the chance that the method errs and does not see it: none is then surer than verdicts

@@ -56,6 +56,26 @@ fn what_a_bent_law_takes_up_is_sought_as_a_second_cause() {
     named(&["amplitude_miscalibration+mode_shape"]);
 }
 
+/// Sebum that thins as the rig warms while it runs (sixth_generator.py, `--seed 61120103`, set 40): a damping
+/// and a detuning at 0.989, while weather that goes with time was none that a size goes with.
+#[test]
+fn a_size_goes_with_weather_that_goes_with_time() {
+    named(&["normal_damping.warm"]);
+}
+
+/// Two pulleys that beat were named as a ripple and a standing wave, which leave 16 deviations of chi2; the
+/// same sebum (sets 180 and 135) as a damping and a detuning, beside a damping by temperature that leaves none.
+#[test]
+fn two_causes_that_leave_a_misfit_or_that_one_replaces_are_not_named() {
+    for set in ["speed_ripple.two_pulleys", "normal_damping.warm_runs"] {
+        let (verdict, text, effects) = diagnosed(set);
+        assert_ne!(verdict, Verdict::Named, "{text}");
+        assert_eq!(effects.len(), 2, "{text}");
+    }
+    let remarks = report("speed_ripple.two_pulleys", &Options::default()).remarks;
+    assert!(remarks.iter().any(|r| r.starts_with("What leads leaves a misfit")), "{remarks:?}");
+}
+
 /// Friction that jumps at a speed (tests/peers/fourth_generator.py, `--seed 41112802`, set 196): a function of
 /// the speed bends to it, and rate dependence was named. The law alone takes up a third of the gap.
 #[test]
@@ -91,13 +111,15 @@ fn what_is_left_out_is_no_member_of_a_pair() {
     }
 }
 
-fn named(causes: &[&str]) {
-    causes.par_iter().for_each(|cause| {
-        let (verdict, text, mut effects) = diagnosed(cause);
+/// Of each set the cause, which comes before a dot in its name.
+fn named(sets: &[&str]) {
+    sets.par_iter().for_each(|set| {
+        let cause = set.split('.').next().unwrap();
+        let (verdict, text, mut effects) = diagnosed(set);
         assert_eq!(verdict, Verdict::Named, "{cause}: {text}");
         assert!(!text.replace(" + ", " ").contains('+'), "a pair is not written as one word: {text}");
         effects.sort_unstable();
-        assert_eq!(effects.join("+"), *cause, "{text}");
+        assert_eq!(effects.join("+"), cause, "{text}");
     });
 }
 
