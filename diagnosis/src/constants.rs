@@ -197,7 +197,7 @@ constants! {
     alias_nats: f64 = 5.0, "Nats within which the data do not tell two hypotheses apart (chi2 of 10).", CONTRACT;
     name_probability: f64 = 0.9, "Probability that a name needs.", CONTRACT;
     alone_share: [f64; 2] = [0.93, 0.993], "Share of its alias class that a name needs: one cause, two.", "development: one cause was never wrong between 0.93 and 0.98 on 190 sets; pairs were wrong by up to 4.5 nats";
-    name_leaves_sd: [f64; 2] = [15.0, 5.0], "Deviations of chi2 that what is named may leave by its mechanism: one cause, two.", "development: on three collections in forms that nobody had fitted single causes that left more were right in 4 of 9 names (the others in 147 of 164), pairs in 1 of 6 (18 of 24)";
+    pair_leaves_sd: f64 = 5.0, "Deviations of chi2 that a pair that is named may leave by its mechanism.", "development: on three collections in forms that nobody had fitted pairs that left more were right in 1 of 6 names, the others in 18 of 24";
     same_forces_chi2: f64 = 4.0, "chi2 between the forces of two hypotheses below which they say the same of a table.", JUDGEMENT;
     prior_nats: f64 = 10.0, "Nats up to which such a hypothesis stays in the leader's class: priors alone make no name.", JUDGEMENT;
     claim_probability: f64 = 0.1, "Probability of no gap above which no gap is claimed.", "judgement: the complement of `name_probability`";

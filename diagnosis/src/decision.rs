@@ -98,7 +98,8 @@ pub fn decide(fitted: &mut Fitted) -> Decision {
     let closes = judged.pooled >= k.region_closed;
     let leads = closes && probabilities[leader] >= alone * of(&class, &probabilities);
     let leaves = leaves_sd(fitted, &candidates[leader].best);
-    let whole = leaves < k.name_leaves_sd[usize::from(candidates[leader].effects.len() > 1)];
+    // Two causes fit so much that what they leave says that they are others.
+    let whole = candidates[leader].effects.len() < 2 || leaves < k.pair_leaves_sd;
     let (none, unknown) = doubted(fitted, none, unknown, &mut probabilities);
     let in_class = of(&class, &probabilities);
     let name = distinct && leads && in_class >= k.name_probability;

@@ -73,7 +73,7 @@ fn two_causes_that_leave_a_misfit_or_that_one_replaces_are_not_named() {
         assert_eq!(effects.len(), 2, "{text}");
     }
     let remarks = report("speed_ripple.two_pulleys", &Options::default()).remarks;
-    assert!(remarks.iter().any(|r| r.starts_with("What leads leaves a misfit")), "{remarks:?}");
+    assert!(remarks.iter().any(|r| r.starts_with("The leading pair leaves a misfit")), "{remarks:?}");
 }
 
 /// Friction that jumps at a speed (tests/peers/fourth_generator.py, `--seed 41112802`, set 196): a function of
