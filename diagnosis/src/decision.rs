@@ -35,7 +35,7 @@ pub struct Decision {
     pub probabilities: Vec<f64>,
     /// Indices of the leader's alias class among the candidates, the leader first; empty where no effect could be tried.
     pub class: Vec<usize>,
-    /// Deviations of chi2 that the leader leaves, where that alone keeps it from a name.
+    /// Deviations of chi2 that a leading pair leaves, where that alone keeps it from a name.
     pub misfit: Option<f64>,
     /// What the left-out regions say about the leader.
     pub gate: Gate,
@@ -98,7 +98,7 @@ pub fn decide(fitted: &mut Fitted) -> Decision {
     let closes = judged.pooled >= k.region_closed;
     let leads = closes && probabilities[leader] >= alone * of(&class, &probabilities);
     let leaves = leaves_sd(fitted, &candidates[leader].best);
-    // Two causes fit so much that what they leave says that they are others.
+    // Two causes can imitate nearly any gap: where they leave a misfit, they are seldom the true ones.
     let whole = candidates[leader].effects.len() < 2 || leaves < k.pair_leaves_sd;
     let (none, unknown) = doubted(fitted, none, unknown, &mut probabilities);
     let in_class = of(&class, &probabilities);

@@ -96,8 +96,8 @@ pub fn of_table(fitted: &Fitted, table: &Table, decision: &Decision) -> Vec<Stri
     remarks.extend(bent(fitted, decision));
     remarks.extend(decision.misfit.map(|sd| {
         format!(
-            "The leading pair leaves a misfit: chi2 is {sd:.0} deviations above what the scatter makes. The causes are others, \
-             or have another form; so it is not named."
+            "The leading pair leaves a misfit: chi2 is {sd:.0} deviations above what the scatter makes. The causes are \
+             others, or have another form; so it is not named."
         )
     }));
     remarks

@@ -7,6 +7,7 @@ use muprime_diagnosis::data::Table;
 use muprime_diagnosis::decision::Verdict;
 use muprime_diagnosis::document::predictions;
 use muprime_diagnosis::hypotheses::Options;
+use muprime_diagnosis::unstated::Unstated;
 use muprime_diagnosis::verdict::{Report, diagnose};
 use rayon::prelude::*;
 use std::path::Path;
@@ -58,9 +59,12 @@ fn what_a_bent_law_takes_up_is_sought_as_a_second_cause() {
 
 /// Sebum that thins as the rig warms while it runs (sixth_generator.py, `--seed 61120103`, set 40): a damping
 /// and a detuning at 0.989, while weather that goes with time was none that a size goes with.
+/// It predicts no condition that does not state the temperature.
 #[test]
 fn a_size_goes_with_weather_that_goes_with_time() {
     named(&["normal_damping.warm"]);
+    let why = refused("normal_damping.warm", |p| Pass { temperature_c: None, ..p });
+    assert_eq!((why.column, why.by.as_str()), ("temperature_c", "the size of normal_damping"));
 }
 
 /// Two pulleys that beat were named as a ripple and a standing wave, which leave 16 deviations of chi2; the
@@ -87,17 +91,20 @@ fn a_jump_is_no_cause_whose_function_bends_to_it() {
 /// Menisci pull by the humidity: a condition that does not state one is refused, with the law and the column.
 #[test]
 fn a_law_of_humidity_predicts_no_condition_without_one() {
-    let passes = passes("adhesion");
-    let table = Table::measured(&passes).unwrap();
-    let rig = RigFile::parse(&text("adhesion", "rig.toml")).unwrap();
-    let result = diagnose(&table, &rig, &Options::default(), String::new());
-    let without: Vec<Pass> =
-        passes.iter().cloned().map(|p| Pass { relative_humidity_pct: None, ..p }).collect();
-    let conditions = Table::conditions(&without, &table.origin(&passes)).unwrap();
-    let why = predictions(&result, &conditions).unwrap_err();
-    assert_eq!((why.point, why.column), (passes[0].point, "relative_humidity_pct"));
+    let why = refused("adhesion", |p| Pass { relative_humidity_pct: None, ..p });
+    assert_eq!((why.point, why.column), (passes("adhesion")[0].point, "relative_humidity_pct"));
     assert!(why.by.starts_with("adhesion by its law"), "{why}");
+}
+
+/// Why a set's verdict does not predict its passes with something left out; as they are it does.
+fn refused(set: &str, without: fn(Pass) -> Pass) -> Unstated {
+    let passes = passes(set);
+    let table = Table::measured(&passes).unwrap();
+    let rig = RigFile::parse(&text(set, "rig.toml")).unwrap();
+    let result = diagnose(&table, &rig, &Options::default(), String::new());
     assert!(predictions(&result, &table).is_ok());
+    let without: Vec<Pass> = passes.iter().cloned().map(without).collect();
+    predictions(&result, &Table::conditions(&without, &table.origin(&passes)).unwrap()).unwrap_err()
 }
 
 /// A cause that is left out of the library does not come back in the place of its exact alias in a pair.
