@@ -94,9 +94,11 @@ pub fn description(fitted: &Fitted, decision: &Decision) -> Vec<Description> {
 }
 
 /// Causes that are sure though the verdict is open: those of which the hypotheses together have the
-/// probability of a name, and that no hypothesis lacks which the table does not tell from the leader.
+/// probability of a name, and that no hypothesis lacks which the table does not tell from the leader. None of
+/// a pair that leaves a misfit: of such pairs on labelled sets one member at most was true.
 pub fn at_least(fitted: &Fitted, decision: &Decision) -> Vec<String> {
-    if !matches!(decision.verdict, Verdict::Ambiguous | Verdict::Unknown) {
+    let undecided = matches!(decision.verdict, Verdict::Ambiguous | Verdict::Unknown);
+    if !undecided || decision.misfit.is_some() {
         return Vec::new();
     }
     let of = |effect: usize| -> f64 {

@@ -295,10 +295,15 @@ fn sentence(fitted: &Fitted, decision: &Decision, gap: &Gap, answer: &Answer) ->
                     cause.words.unwrap_or(cause.name)
                 )
             } else {
-                let probability = probability(decision.probabilities[leader]);
-                format!(
-                    "Most likely cause: {name}, but its probability of {probability} is too low to name it; {closed}."
-                )
+                let p = decision.probabilities[leader];
+                let why = if p < fitted.problem.constants.name_probability {
+                    format!("its probability of {} is too low to name it", probability(p))
+                } else if decision.misfit.is_some() {
+                    "it leaves a misfit and is not named".to_string()
+                } else {
+                    "it closes too little of the gap in left-out regions to be named".to_string()
+                };
+                format!("Most likely cause: {name}, but {why}; {closed}.")
             }
         }
         Verdict::Ambiguous => {

@@ -76,8 +76,14 @@ fn two_causes_that_leave_a_misfit_or_that_one_replaces_are_not_named() {
         assert_ne!(verdict, Verdict::Named, "{text}");
         assert_eq!(effects.len(), 2, "{text}");
     }
-    let remarks = report("speed_ripple.two_pulleys", &Options::default()).remarks;
-    assert!(remarks.iter().any(|r| r.starts_with("The leading pair leaves a misfit")), "{remarks:?}");
+    let report = report("speed_ripple.two_pulleys", &Options::default());
+    assert!(
+        report.remarks.iter().any(|r| r.starts_with("The leading pair leaves a misfit")),
+        "{}",
+        report.text
+    );
+    assert!(report.text.contains("leaves a misfit and is not named") && !report.text.contains("too low"));
+    assert!(report.at_least.is_empty(), "{:?}", report.at_least);
 }
 
 /// Friction that jumps at a speed (tests/peers/fourth_generator.py, `--seed 41112802`, set 196): a function of
