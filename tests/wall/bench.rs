@@ -1,5 +1,7 @@
 //! A bench whose quantities a test sets by hand: what goes in must come out of the driver.
 
+use drivers::{InstrumentsSetup, Rig};
+use realtime::clock::Clock;
 use realtime::ports::Nanos;
 use sim::wire::device::Device;
 use sim::wire::modbus_tcp::ModbusTcpServer;
@@ -125,6 +127,16 @@ pub fn eventually<T>(what: &str, mut attempt: impl FnMut() -> Option<T>) -> T {
         assert!(began.elapsed() < Duration::from_secs(10), "never: {what}");
         std::thread::sleep(Duration::from_millis(1));
     }
+}
+
+/// Opens a rig whose instruments answer. A machine that stalls may keep an answer for longer than a profile
+/// allows, and then the rig does not open, rightly: it is asked for ten times.
+///
+/// # Panics
+/// With what the last attempt met.
+pub fn opened(instruments: &InstrumentsSetup, clock: impl Into<Clock> + Clone) -> Rig {
+    let open = || drivers::open(instruments, clock.clone());
+    (1..10).find_map(|_| open().ok()).unwrap_or_else(|| open().unwrap_or_else(|error| panic!("{error}")))
 }
 
 /// Nanoseconds since the epoch.

@@ -14,7 +14,7 @@ use sim::wire::device::Device;
 use sim::wire::{Quantity, SharedPlant};
 use std::process::{Command, Stdio};
 use std::time::{Duration, Instant};
-use wall::bench::{self, Bench, BenchPlant, eventually, now};
+use wall::bench::{self, Bench, BenchPlant, eventually, now, opened};
 
 /// What `can-guest` ends with where the guest itself failed, and not the command in it.
 const NO_GUEST: i32 = 125;
@@ -79,7 +79,7 @@ fn forces_over_socketcan() {
     let emulator = CanEmulator::start(KernelCan::open("vcan0").unwrap(), devices, plant).unwrap();
     // In the guest the answer may take its time.
     setup.amplifier.rate_hz = Some(10.0);
-    let mut rig = drivers::open(&setup, epoch).unwrap();
+    let mut rig = opened(&setup, epoch);
     let forces = eventually("forces", || Some(rig.force.read(now(epoch))).filter(|f| f.normal.is_ok()));
     assert!((forces.lateral.unwrap().value + 1.5).abs() <= 2.5e-4, "{forces:?}");
     assert!((forces.normal.unwrap().value - 2.25).abs() <= 2.5e-4, "{forces:?}");
@@ -130,7 +130,7 @@ fn bus_off_ends_the_link_and_nothing_restarts_by_itself() {
     let plant = SharedPlant::new(BenchPlant::new(&bench), epoch);
     let devices = vec![CanDevice { device: device("ati-netft-can"), base: 432 }];
     let _emulator = CanEmulator::start(KernelCan::open("vcan0").unwrap(), devices, plant).unwrap();
-    let mut rig = drivers::open(&setup, epoch).unwrap();
+    let mut rig = opened(&setup, epoch);
     eventually("forces", || rig.force.read(now(epoch)).normal.ok());
     let said = goes_off("vcan0", || rig.links.health().next().unwrap().1.last_problem);
     assert!(said.contains("by hand"), "{said}");
@@ -175,7 +175,7 @@ fn a_warning_is_noted_and_a_passive_controller_ends_the_link() {
     let plant = SharedPlant::new(BenchPlant::new(&bench), epoch);
     let devices = vec![CanDevice { device: device("ati-netft-can"), base: 432 }];
     let _emulator = CanEmulator::start(KernelCan::open("vcan0").unwrap(), devices, plant).unwrap();
-    let mut rig = drivers::open(&setup, epoch).unwrap();
+    let mut rig = opened(&setup, epoch);
     eventually("forces", || rig.force.read(now(epoch)).normal.ok());
     let health = |rig: &drivers::Rig| rig.links.health().next().unwrap().1;
     // A slow guest makes connections anew for its own reasons: said again until it is heard.
@@ -206,7 +206,7 @@ fn a_bus_full_of_others_frames_holds_nothing_up() {
     let plant = SharedPlant::new(BenchPlant::new(&bench), epoch);
     let devices = vec![CanDevice { device: device("ati-netft-can"), base: 432 }];
     let _emulator = CanEmulator::start(KernelCan::open("vcan0").unwrap(), devices, plant).unwrap();
-    let mut rig = drivers::open(&setup, epoch).unwrap();
+    let mut rig = opened(&setup, epoch);
     eventually("forces", || rig.force.read(now(epoch)).normal.ok());
     let mut noise = KernelCan::open("vcan0").unwrap();
     let first = rig.links.health().next().unwrap().1.samples;
@@ -272,7 +272,7 @@ fn no_command_from_before_a_bus_off_leaves_after_it() {
             }
         }
     };
-    let mut rig = drivers::open(&setup, epoch).unwrap();
+    let mut rig = opened(&setup, epoch);
     let health = |rig: &drivers::Rig| rig.links.health().last().unwrap().1;
     let mut beat = 0;
     let mut command = |rig: &mut drivers::Rig, for_s: f64| {

@@ -252,7 +252,7 @@ impl Bench {
         let plant = SharedPlant::new(world, epoch);
         let mut instruments = setup.instruments();
         let embedded = rig::emulators::embed(&mut instruments, &plant, false).unwrap();
-        let rig = drivers::open(&instruments, epoch).unwrap();
+        let rig = wall::bench::opened(&instruments, epoch);
         Bench { plant, hands, rig, setup, epoch, _embedded: embedded }
     }
 

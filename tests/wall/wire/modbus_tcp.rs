@@ -9,7 +9,7 @@ use std::net::{SocketAddr, TcpListener};
 use std::sync::Arc;
 use std::sync::atomic::{AtomicBool, AtomicUsize, Ordering};
 use std::time::{Duration, Instant};
-use wall::bench::{self, Bench, eventually, now};
+use wall::bench::{self, Bench, eventually, now, opened};
 
 /// A setup whose instruments all stand at one address.
 fn setup(address: SocketAddr) -> InstrumentsSetup {
@@ -39,7 +39,7 @@ fn what_stands_in_the_registers_comes_out_of_the_ports() {
         bench.set(quantity, value);
     }
     let server = bench::serve_apart(&bench, epoch);
-    let mut rig = drivers::open(&setup(server.address()), epoch).unwrap();
+    let mut rig = opened(&setup(server.address()), epoch);
     let forces = eventually("a force", || Some(rig.force.read(now(epoch))).filter(|f| f.lateral.is_ok()));
     let (lateral, normal) = (forces.lateral.unwrap(), forces.normal.unwrap());
     assert!((lateral.value - -0.12345).abs() < 1e-12 && lateral.raw == -12345, "{lateral:?}");
@@ -72,7 +72,7 @@ fn what_stands_in_the_registers_comes_out_of_the_ports() {
 fn ages_are_those_of_the_instrument() {
     let (bench, epoch) = (Bench::default(), Instant::now());
     let server = bench::serve_apart(&bench, epoch);
-    let mut rig = drivers::open(&setup(server.address()), epoch).unwrap();
+    let mut rig = opened(&setup(server.address()), epoch);
     let mut last = None;
     for _ in 0..200 {
         let reading = eventually("a newer sample", || {
@@ -93,7 +93,7 @@ fn ages_are_those_of_the_instrument() {
 fn saturation_and_faults_reach_the_loop() {
     let (bench, epoch) = (Bench::default(), Instant::now());
     let server = bench::serve_apart(&bench, epoch);
-    let mut rig = drivers::open(&setup(server.address()), epoch).unwrap();
+    let mut rig = opened(&setup(server.address()), epoch);
     bench.set(Quantity::LateralForce, 25.0);
     eventually("the lateral axis at its rail", || {
         rig.force.read(now(epoch)).lateral.ok().filter(|r| r.quality == Quality::Saturated)
@@ -153,7 +153,7 @@ fn two_terminals_give_an_axis_each() {
             ..InstrumentSetup::new("hbk-wtx110", &normal.address().to_string())
         },
     ];
-    let mut rig = drivers::open(&setup, epoch).unwrap();
+    let mut rig = opened(&setup, epoch);
     let forces = eventually("both", || {
         // The first samples were taken before the epoch, and show its time.
         let forces = rig.force.read(now(epoch));
@@ -171,7 +171,7 @@ fn two_terminals_give_an_axis_each() {
 fn only_commands_in_time_leave_and_an_end_makes_safe() {
     let (bench, epoch) = (Bench::default(), Instant::now());
     let server = bench::serve_apart(&bench, epoch);
-    let mut rig = drivers::open(&setup(server.address()), epoch).unwrap();
+    let mut rig = opened(&setup(server.address()), epoch);
     // Expired when it is given: it must never leave.
     rig.amplifier.command(DriveCommand::off(41, realtime::ports::Nanos(0)), now(epoch));
     std::thread::sleep(Duration::from_millis(30));
@@ -299,7 +299,7 @@ fn no_prank_ever_becomes_a_force() {
         let (bench, epoch) = (Bench::default(), Instant::now());
         let others = bench::serve_apart(&bench, epoch);
         let (address, connections, played) = prankster(prank, 20, prank != Prank::Twice);
-        let mut rig = drivers::open(&with_prankster(address, others.address()), epoch).unwrap();
+        let mut rig = opened(&with_prankster(address, others.address()), epoch);
         let mut wrong = 0;
         let mut down = false;
         let mut look = |rig: &mut drivers::Rig| {
@@ -393,7 +393,7 @@ fn a_relay_and_safety_contacts_behind_coils_and_discrete_inputs() {
     let relay = InstrumentSetup::new("muprime-relay", &server.address().to_string());
     (setup.supply_relay, setup.safety_inputs) = (Some(relay.clone()), Some(relay));
     bench.set(Quantity::EmergencyStop, 1.0);
-    let mut rig = drivers::open(&setup, epoch).unwrap();
+    let mut rig = opened(&setup, epoch);
     let (supply, contacts): (&mut dyn SupplySwitch, &mut dyn SafetyInputs) =
         (&mut *rig.supply, &mut *rig.contacts);
     eventually("the relay is open", || supply.state(now(epoch)).ok().filter(|state| state.cut));
