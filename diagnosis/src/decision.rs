@@ -33,6 +33,8 @@ pub struct Decision {
     pub unknown: f64,
     /// Probabilities of the candidates, in their order, after the regions have spoken.
     pub probabilities: Vec<f64>,
+    /// Probabilities of the pairs that were not weighed, in their order.
+    pub unweighed: Vec<f64>,
     /// Indices of the leader's alias class among the candidates, the leader first; empty where no effect could be tried.
     pub class: Vec<usize>,
     /// Deviations of chi2 that a leading pair leaves, where that alone keeps it from a name.
@@ -47,6 +49,13 @@ impl Decision {
     /// Index of the leading candidate; none where no effect could be tried.
     pub fn leader(&self) -> Option<usize> {
         self.class.first().copied()
+    }
+
+    /// Every cause and pair, weighed or not, with its probability.
+    pub fn stated<'a>(&'a self, fitted: &'a Fitted) -> impl Iterator<Item = (&'a [usize], f64)> {
+        let weighed = fitted.candidates.iter().map(|c| c.effects.as_slice()).zip(&self.probabilities);
+        let others = fitted.unweighed.iter().map(|pair| pair.as_slice()).zip(&self.unweighed);
+        weighed.chain(others).map(|(effects, p)| (effects, *p))
     }
 }
 
@@ -68,8 +77,9 @@ pub fn decide(fitted: &mut Fitted) -> Decision {
         // No effect could be tried: there is a gap of an unknown cause, or none.
         let k = &fitted.problem.constants;
         let verdict = if none < k.claim_probability { Verdict::Unknown } else { Verdict::NoGap };
-        let (class, regions, gate) = (Vec::new(), Vec::new(), gate(k, &[]));
-        return Decision { verdict, none, unknown, probabilities, class, misfit: None, gate, regions };
+        let (unweighed, class, regions) = (Vec::new(), Vec::new(), Vec::new());
+        let (gate, misfit) = (gate(k, &[]), None);
+        return Decision { verdict, none, unknown, probabilities, unweighed, class, misfit, gate, regions };
     };
     let claimed = none < fitted.problem.constants.claim_probability;
     let (regions, judged, survival) = judged(fitted, leader, claimed);
@@ -100,7 +110,7 @@ pub fn decide(fitted: &mut Fitted) -> Decision {
     let leaves = leaves_sd(fitted, &candidates[leader].best);
     // Two causes can imitate nearly any gap: where they leave a misfit, they are seldom the true ones.
     let whole = candidates[leader].effects.len() < 2 || leaves < k.pair_leaves_sd;
-    let (none, unknown) = doubted(fitted, none, unknown, &mut probabilities);
+    let (none, unknown, unweighed) = doubted(fitted, none, unknown, &mut probabilities);
     let in_class = of(&class, &probabilities);
     let name = distinct && leads && in_class >= k.name_probability;
     let verdict = if !claimed || none >= in_class.max(unknown) {
@@ -114,24 +124,25 @@ pub fn decide(fitted: &mut Fitted) -> Decision {
     };
     class.extend(renamed.into_iter().filter(|_| verdict == Verdict::Ambiguous));
     let misfit = (verdict == Verdict::Ambiguous && name).then_some(leaves);
-    Decision { verdict, none, unknown, probabilities, class, misfit, gate: judged, regions }
+    Decision { verdict, none, unknown, probabilities, unweighed, class, misfit, gate: judged, regions }
 }
 
 /// Probabilities with the chance that the method errs and does not see it: none is then surer than verdicts
-/// on labelled sets have been right, and none is 1e-40. What no hypothesis explains may be a cause of the
-/// library all the same, in a form that neither its laws nor a function beside them reach: a share of the
-/// open set goes to the causes.
-fn doubted(fitted: &Fitted, none: f64, unknown: f64, probabilities: &mut [f64]) -> (f64, f64) {
+/// on labelled sets have been right, and none is 1e-40, nor nothing for a pair that was not weighed. What no
+/// hypothesis explains may be a cause of the library all the same, in a form that neither its laws nor a
+/// function beside them reach: a share of the open set goes to the causes.
+fn doubted(fitted: &Fitted, none: f64, unknown: f64, probabilities: &mut [f64]) -> (f64, f64, Vec<f64>) {
     let k = &fitted.problem.constants;
-    let (no_gap, open, each) = fitted.coarse();
+    let coarse = fitted.coarse();
     let mixed = |p: f64, coarse: f64| (1.0 - k.doubt) * p + k.doubt * coarse;
-    let (none, unknown) = (mixed(none, no_gap), mixed(unknown, open));
-    let causes = each.iter().sum::<f64>().max(f64::MIN_POSITIVE);
+    let (none, unknown) = (mixed(none, coarse.no_gap), mixed(unknown, coarse.open));
+    let causes = coarse.each.iter().chain(&coarse.unweighed).sum::<f64>().max(f64::MIN_POSITIVE);
     let foreign = if probabilities.is_empty() { 0.0 } else { k.foreign_form * unknown };
-    for (p, coarse) in probabilities.iter_mut().zip(each) {
-        *p = mixed(*p, coarse) + foreign * coarse / causes;
+    let stated = |p: f64, coarse: f64| mixed(p, coarse) + foreign * coarse / causes;
+    for (p, &coarse) in probabilities.iter_mut().zip(&coarse.each) {
+        *p = stated(*p, coarse);
     }
-    (none, unknown - foreign)
+    (none, unknown - foreign, coarse.unweighed.iter().map(|&coarse| stated(0.0, coarse)).collect())
 }
 
 /// The leader on the left-out regions. Of its laws that the evidence does not tell apart the one that

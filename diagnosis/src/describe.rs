@@ -102,8 +102,7 @@ pub fn at_least(fitted: &Fitted, decision: &Decision) -> Vec<String> {
         return Vec::new();
     }
     let of = |effect: usize| -> f64 {
-        let with = fitted.candidates.iter().zip(&decision.probabilities);
-        with.filter(|(c, _)| c.effects.contains(&effect)).map(|(_, p)| p).sum()
+        decision.stated(fitted).filter(|(members, _)| members.contains(&effect)).map(|(_, p)| p).sum()
     };
     let name = fitted.problem.constants.name_probability;
     let open = decision.verdict == Verdict::Ambiguous;

@@ -11,6 +11,7 @@ use crate::noise::{PureError, variance};
 use crate::scatter::Scatter;
 use crate::structure::Structure;
 use crate::structure::shapes::{self, Shape};
+use std::collections::BTreeMap;
 
 /// One hypothesis with effects: its evidence over laws and shares, and its best law.
 #[derive(Clone)]
@@ -93,12 +94,26 @@ pub struct Fitted {
     pub tried: usize,
     /// Single effects and pairs, most probable first.
     pub candidates: Vec<Candidate>,
+    /// Pairs of causes that were not weighed.
+    pub unweighed: Vec<[usize; 2]>,
     /// Effects that this table cannot show, with what is missing.
     pub not_testable: Vec<(&'static str, String)>,
     /// Kernels of the departures from form.
     pub kernels: Kernels,
     /// Their values at the table's passes.
     pub basis: Basis,
+}
+
+/// Probabilities where the evidence counts for next to nothing.
+pub(crate) struct Coarse {
+    /// Of no gap.
+    pub no_gap: f64,
+    /// Of the open set.
+    pub open: f64,
+    /// Of the candidates, in their order.
+    pub each: Vec<f64>,
+    /// Of the pairs that were not weighed.
+    pub unweighed: Vec<f64>,
 }
 
 impl Fitted {
@@ -153,21 +168,28 @@ impl Fitted {
         candidate.log_evidence - self.evidence[0] - self.open_nats().max(0.0)
     }
 
-    /// Probabilities as they would be if the evidence counted for next to nothing: of no gap, of the open
-    /// set, and of each cause. It is all that stands where the method errs without seeing it.
-    pub(crate) fn coarse(&self) -> (f64, f64, Vec<f64>) {
+    /// Probabilities as they would be if the evidence counted for next to nothing. It is all that stands where
+    /// the method errs without seeing it. A pair that was not weighed predicts at least what its better member
+    /// does, where the other's size is nothing: it has that evidence.
+    pub(crate) fn coarse(&self) -> Coarse {
         let k = &self.problem.constants;
-        let (none, open) = (self.evidence[0], self.open_nats());
-        let mut all = vec![k.prior_null.ln(), k.prior_open.ln() + open / k.doubt_temper];
-        all.extend(
-            self.candidates
-                .iter()
-                .map(|c| self.log_prior(c.effects.len()) + (c.log_evidence - none) / k.doubt_temper),
-        );
+        let none = self.evidence[0];
+        let weight =
+            |effects: usize, evidence: f64| self.log_prior(effects) + (evidence - none) / k.doubt_temper;
+        let alone: BTreeMap<usize, f64> = self
+            .candidates
+            .iter()
+            .filter(|c| c.effects.len() == 1)
+            .map(|c| (c.effects[0], c.log_evidence))
+            .collect();
+        let mut all = vec![k.prior_null.ln(), k.prior_open.ln() + self.open_nats() / k.doubt_temper];
+        all.extend(self.candidates.iter().map(|c| weight(c.effects.len(), c.log_evidence)));
+        all.extend(self.unweighed.iter().map(|[a, b]| weight(2, alone[a].max(alone[b]))));
         let total = log_sum_exp(&all);
         let mut all = all.into_iter().map(|v| (v - total).exp());
         let (no_gap, open) = (all.next().unwrap_or(0.0), all.next().unwrap_or(0.0));
-        (no_gap, open, all.collect())
+        let each = all.by_ref().take(self.candidates.len()).collect();
+        Coarse { no_gap, open, each, unweighed: all.collect() }
     }
 
     /// Logarithm of the prior probability of one hypothesis with so many effects.

@@ -18,9 +18,10 @@ use crate::scatter::{Belief, Scatter};
 use crate::singles::{SINGLES_END, Search, lapsed, singles, sort, unlisted};
 use crate::starts::{nuisances_of, tempered};
 use crate::structure::{shapes, structure};
-use effects::{Effect, library};
+use effects::{Effect, library, one_cause};
 use models::condition::Condition;
 use rayon::prelude::*;
+use std::collections::BTreeSet;
 use std::sync::Arc;
 
 /// Choices of a diagnosis.
@@ -137,6 +138,7 @@ pub fn fit_believing(table: &Table, rig: &RigFile, options: &Options, belief: &B
         sought_again(&problem, &mut candidates, &companions, &search);
         candidates.extend(companions);
     }
+    let unweighed = if options.pairs { unweighed(&candidates) } else { Vec::new() };
 
     progress.with("what the library cannot say", 0.7, || leading(&candidates));
     let smooth = open_evidence(k, &discrepancy, &unlisted);
@@ -158,6 +160,7 @@ pub fn fit_believing(table: &Table, rig: &RigFile, options: &Options, belief: &B
         evidence: [none_evidence, smooth],
         tried: tried.len(),
         candidates,
+        unweighed,
         not_testable,
         kernels,
         basis,
@@ -170,6 +173,17 @@ pub fn fit_believing(table: &Table, rig: &RigFile, options: &Options, belief: &B
         fitted.scatter.suspects.retain(|s| !belonging.contains(&s.row));
     }
     fitted
+}
+
+/// Pairs of the single causes that are not among the candidates: all but those of one cause by two names.
+fn unweighed(candidates: &[Candidate]) -> Vec<[usize; 2]> {
+    let mut alone: Vec<usize> =
+        candidates.iter().filter(|c| c.effects.len() == 1).map(|c| c.effects[0]).collect();
+    alone.sort_unstable();
+    let weighed: BTreeSet<&[usize]> = candidates.iter().map(|c| c.effects.as_slice()).collect();
+    let name = |e: usize| effects::at(e).name;
+    let pairs = alone.iter().enumerate().flat_map(|(i, &a)| alone[i + 1..].iter().map(move |&b| [a, b]));
+    pairs.filter(|p| !weighed.contains(p.as_slice()) && !one_cause(name(p[0]), name(p[1]))).collect()
 }
 
 /// Rows of suspect passes that a cause explains.

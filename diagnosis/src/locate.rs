@@ -3,6 +3,7 @@
 mod partition;
 
 use crate::data::RigFile;
+use crate::decision::Decision;
 use crate::fitted::Fitted;
 use crate::predict::{Forecast, Model, forecast};
 use effects::Location;
@@ -28,13 +29,13 @@ pub struct Region {
 }
 
 /// Probability by place; `unknown` is the open set's.
-pub fn ledger(fitted: &Fitted, probabilities: &[f64], unknown: f64) -> BTreeMap<&'static str, f64> {
+pub fn ledger(fitted: &Fitted, decision: &Decision) -> BTreeMap<&'static str, f64> {
     let mut map: BTreeMap<&'static str, f64> =
         Location::ALL.iter().map(|place| (place.name(), 0.0)).collect();
-    map.insert("unknown", unknown);
-    for (c, p) in fitted.candidates.iter().zip(probabilities) {
-        for &e in &c.effects {
-            *map.entry(effects::at(e).place.name()).or_insert(0.0) += p / c.effects.len() as f64;
+    map.insert("unknown", decision.unknown);
+    for (members, p) in decision.stated(fitted) {
+        for &e in members {
+            *map.entry(effects::at(e).place.name()).or_insert(0.0) += p / members.len() as f64;
         }
     }
     let total: f64 = map.values().sum();

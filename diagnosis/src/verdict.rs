@@ -180,7 +180,7 @@ pub fn diagnose(table: &Table, rig: &RigFile, options: &Options, sha256: String)
     let answer = Answer::of(&fitted, decision.verdict, leader);
     let gap = gap(&fitted, table, rig, &answer);
     let location = Where {
-        place: ledger(&fitted, &decision.probabilities, decision.unknown),
+        place: ledger(&fitted, &decision),
         regions: if decision.verdict == Verdict::NoGap {
             Vec::new()
         } else {
@@ -364,11 +364,13 @@ fn hypotheses(
             }
         })
         .collect();
-    for (effects, probability) in
-        [(Vec::new(), decision.none), (vec!["unknown".to_string()], decision.unknown)]
-    {
+    let names = |pair: &[usize]| pair.iter().map(|&e| effects::at(e).name.to_string()).collect();
+    let unweighed = fitted.unweighed.iter().zip(&decision.unweighed).filter(|(_, p)| **p > LISTED);
+    let others = [(Vec::new(), decision.none), (vec!["unknown".to_string()], decision.unknown)];
+    let others = others.into_iter().chain(unweighed.map(|(pair, p)| (names(pair), *p)));
+    for (effects, probability) in others {
         list.push(Hypothesis {
-            alias_class: effects.clone(),
+            alias_class: (!effects.is_empty()).then(|| effects.join("+")).into_iter().collect(),
             effects,
             probability,
             laws: Vec::new(),

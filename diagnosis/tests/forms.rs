@@ -8,7 +8,7 @@ use muprime_diagnosis::decision::Verdict;
 use muprime_diagnosis::document::predictions;
 use muprime_diagnosis::hypotheses::Options;
 use muprime_diagnosis::unstated::Unstated;
-use muprime_diagnosis::verdict::{Report, diagnose};
+use muprime_diagnosis::verdict::{Hypothesis, Report, diagnose};
 use rayon::prelude::*;
 use std::path::Path;
 
@@ -65,6 +65,26 @@ fn a_size_goes_with_weather_that_goes_with_time() {
     named(&["normal_damping.warm"]);
     let why = refused("normal_damping.warm", |p| Pass { temperature_c: None, ..p });
     assert_eq!((why.column, why.by.as_str()), ("temperature_c", "the size of normal_damping"));
+}
+
+/// A cause that is named may be one of two, the other too small to be weighed: each such pair has a
+/// probability, and none does where pairs are not tried.
+#[test]
+fn a_pair_that_was_not_weighed_is_not_impossible() {
+    let alone = |h: &&Hypothesis| h.effects.len() == 1 && h.effects[0] != "unknown";
+    let with = report("speed_error", &Options::default());
+    let leader = &with.hypotheses[0].effects[0];
+    for other in with.hypotheses.iter().filter(alone).map(|h| &h.effects[0]).filter(|o| *o != leader) {
+        let pair =
+            |h: &&Hypothesis| h.effects.len() == 2 && [leader, other].iter().all(|n| h.effects.contains(n));
+        let stated = with.hypotheses.iter().find(pair).map_or(0.0, |h| h.probability);
+        assert!(effects::one_cause(leader, other) || stated > 1e-5, "{leader} and {other}: {stated:e}");
+    }
+    let singles = report("speed_error", &Options { pairs: false, ..Options::default() });
+    assert!(singles.hypotheses.iter().all(|h| h.effects.len() < 2));
+    for report in [with, singles] {
+        assert!((report.hypotheses.iter().map(|h| h.probability).sum::<f64>() - 1.0).abs() < 1e-12);
+    }
 }
 
 /// Two pulleys that beat were named as a ripple and a standing wave, which leave 16 deviations of chi2; the
