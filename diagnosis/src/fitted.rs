@@ -168,8 +168,8 @@ impl Fitted {
         candidate.log_evidence - self.evidence[0] - self.open_nats().max(0.0)
     }
 
-    /// Probabilities as they would be if the evidence counted for next to nothing. It is all that stands where
-    /// the method errs without seeing it. A pair that was not weighed predicts at least what its better member
+    /// Probabilities as they would be if the evidence counted for next to nothing: all that stands where the
+    /// method errs without seeing it. A pair that was not weighed predicts at least what its better member
     /// does, where the other's size is nothing: it has that evidence.
     pub(crate) fn coarse(&self) -> Coarse {
         let k = &self.problem.constants;
