@@ -1,6 +1,7 @@
 //! A bench whose quantities a test sets by hand: what goes in must come out of the driver.
 
-use drivers::{InstrumentsSetup, Rig};
+use drivers::ended::Ended;
+use drivers::{InstrumentsSetup, OpenError, Rig};
 use realtime::clock::Clock;
 use realtime::ports::Nanos;
 use sim::wire::device::Device;
@@ -130,13 +131,17 @@ pub fn eventually<T>(what: &str, mut attempt: impl FnMut() -> Option<T>) -> T {
 }
 
 /// Opens a rig whose instruments answer. A machine that stalls may keep an answer for longer than a profile
-/// allows, and then the rig does not open, rightly: it is asked for ten times.
+/// allows, and then the rig does not open, rightly: it is tried up to ten times, after a late answer alone.
 ///
 /// # Panics
-/// With what the last attempt met.
+/// With what the last attempt met: at once with any other error.
 pub fn opened(instruments: &InstrumentsSetup, clock: impl Into<Clock> + Clone) -> Rig {
     let open = || drivers::open(instruments, clock.clone());
-    (1..10).find_map(|_| open().ok()).unwrap_or_else(|| open().unwrap_or_else(|error| panic!("{error}")))
+    let late = |tried: &Result<Rig, OpenError>| {
+        matches!(tried, Err(OpenError::Link { problem: Ended::Timeout(_) | Ended::Cut(_), .. }))
+    };
+    let tried = (1..10).map(|_| open()).find(|tried| !late(tried)).unwrap_or_else(open);
+    tried.unwrap_or_else(|error| panic!("{error}"))
 }
 
 /// Nanoseconds since the epoch.
