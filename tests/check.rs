@@ -353,6 +353,40 @@ fn all_problems_are_told_at_once() {
     assert_eq!(lines(&said).len(), 3, "{said}");
 }
 
+/// All faults of a table, each at its cell; `diagnose` refuses the table with the same help.
+#[test]
+fn every_faulty_cell_of_a_table_is_reported() {
+    let made = Made::new();
+    let text = made.text("run/points.csv");
+    let columns: Vec<&str> = text.lines().next().unwrap().split(',').collect();
+    let mut rows: Vec<Vec<String>> =
+        text.lines().map(|line| line.split(',').map(str::to_string).collect()).collect();
+    for (row, column, value) in
+        [(2, "speed_m_s", "fast"), (4, "normal_force_n", "-0.25"), (5, "direction", "3"), (6, "time_s", "")]
+    {
+        rows[row][columns.iter().position(|c| *c == column).unwrap()] = value.to_string();
+    }
+    let text: String = rows.iter().map(|row| row.join(",") + "\n").collect();
+    std::fs::write(made.at("faulty.csv"), &text).unwrap();
+    let (code, said) = checked(&[], &made.at("faulty.csv"));
+    let problems = said["problems"].as_array().unwrap();
+    let at = |p: &Value| (p["line"].as_u64().unwrap() as usize, p["column"].as_u64().unwrap() as usize);
+    let lines: Vec<usize> = problems.iter().map(|p| at(p).0).collect();
+    assert_eq!((code, lines), (Some(2), vec![3, 5, 6, 7]), "{said}");
+    for p in problems {
+        let (line, column) = at(p);
+        let cell = &text.lines().nth(line - 1).unwrap()[column - 1..];
+        assert!(["fast", "-0.25", "3,", ","].iter().any(|with| cell.starts_with(with)), "{cell}: {p}");
+    }
+    let output = muprime().args(["--json", "diagnose"]).arg(made.at("faulty.csv")).output().unwrap();
+    let said = &documents(&output)[0];
+    assert!(said["help"].as_str().is_some_and(|help| help.contains("muprime import")), "{said}");
+    std::fs::remove_file(made.at("rig.toml")).unwrap();
+    let output = muprime().args(["--json", "diagnose"]).arg(made.at("faulty.csv")).output().unwrap();
+    let said = &documents(&output)[0];
+    assert!(said["help"].as_str().is_some_and(|help| help.contains("normal_stiffness_n_per_m")), "{said}");
+}
+
 /// A unit that slipped where the value is admitted is remarked on.
 #[test]
 fn units_that_slipped_are_remarked_on() {

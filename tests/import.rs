@@ -207,6 +207,23 @@ fn what_cannot_be_taken_is_refused_with_the_remedy() {
         refused(folder, "MATLAB 5.0 MAT-file, made by hand", &["--yes"]).contains("cut short or damaged")
     );
     assert!(refused(folder, "\n\n", &["--yes"]).contains("no rows of numbers"));
+    let header = "time (s);amplitude (um);speed (mm/s)\n";
+    for (text, words) in [
+        (header, "no rows of numbers below the header (line 1 is the last)"),
+        (&format!("sep=;\n\n{header}s;um;mm/s\n"), "below the header (line 4 is the last)"),
+        ("", "the file is empty"),
+        ("# nothing yet\n", "the file holds comment lines alone"),
+        ("a word\nanother\n", "no delimiter separates the lines"),
+    ] {
+        let said = refused(folder, text, &["--yes"]);
+        assert!(said.contains(words), "{text}: {said}");
+        assert_eq!(said.contains("give the delimiter"), text.starts_with("a word"), "{text}: {said}");
+    }
+    // The place is a file.
+    let source = folder.join("refused.csv");
+    let output = muprime().arg("import").arg(&source).args(["--yes", "-o"]).arg(&source).output().unwrap();
+    assert_eq!(output.status.code(), Some(2));
+    assert!(texts(&output).1.contains("name a folder, as in -o imported"), "{}", texts(&output).1);
     // A folder with a table is left as it is.
     let out = folder.join("taken");
     std::fs::create_dir(&out).unwrap();
@@ -220,6 +237,169 @@ fn what_cannot_be_taken_is_refused_with_the_remedy() {
         .unwrap();
     assert_eq!(output.status.code(), Some(2));
     assert_eq!(std::fs::read_to_string(out.join("points.csv")).unwrap(), "mine");
+}
+
+/// A table with unreadable cells in three of four rows is refused, with the help that fits the cells.
+#[test]
+fn a_table_of_mostly_unreadable_rows_is_refused_with_a_help_for_each_reason() {
+    let folder = tempfile::tempdir().unwrap();
+    let table = |every: u32, time: &str, lateral: &str, direction: &str| {
+        let mut text = String::from("t_s;w_um;f_khz;v_mm_s;dir;fn_n;ft_n\n");
+        for k in 0..24 {
+            let or = |good: String, bad: &str| {
+                if k % every == 0 || bad.is_empty() { good } else { bad.to_string() }
+            };
+            let (t, ft, dir) =
+                (or(k.to_string(), time), or(format!("0,1{k}"), lateral), or("1".into(), direction));
+            writeln!(text, "{t};1,5;27,5;10;{dir};0,25;{ft}").unwrap();
+        }
+        text
+    };
+    for (time, lateral, direction, words) in [
+        ("", "OVL", "", "'OVL' is no number"),
+        ("", "1.200,0", "", "without thousands separators"),
+        ("later", "", "", "01.03.2024 12:34:56"),
+        ("", "", "up", "forward or backward is needed"),
+    ] {
+        let said = refused(folder.path(), &table(4, time, lateral, direction), &["--yes"]);
+        assert!(said.contains("6 of 24 rows can be taken") && said.contains(words), "{words}: {said}");
+    }
+    // Half of the rows are enough, and lines of text are no rows.
+    let path = folder.path().join("half.csv");
+    std::fs::write(&path, table(2, "", "OVL", "").replace("\n4;", "\nload changed\n4;")).unwrap();
+    let half = import(folder.path(), &path, &["--yes"]);
+    assert_eq!((half.passes.len(), half.log["dropped"].as_array().unwrap().len()), (12, 13));
+    // A record of samples is no exception.
+    let mut record = String::from("t_s;x_mm;fn_n;ft_n\n");
+    for k in 0..400 {
+        let lateral = if k % 4 > 0 { "OVL".into() } else { "0,1".to_string() };
+        writeln!(
+            record,
+            "{};{};0,25;{lateral}",
+            comma(&format!("{:.2}", f64::from(k) * 0.01)),
+            comma(&format!("{:.1}", f64::from(k) * 0.1))
+        )
+        .unwrap();
+    }
+    let said = refused(folder.path(), &record, &["--series", "--yes", "--set", "amplitude_pp_m=0"]);
+    assert!(said.contains("100 of 400 rows can be taken"), "{said}");
+}
+
+/// One entry of a map leaves the rest to the guess, which must be confirmed; a whole map is taken as it is.
+#[test]
+fn what_a_map_leaves_open_is_guessed_and_confirmed() {
+    let folder = tempfile::tempdir().unwrap();
+    let text = lines(&truth(false), "t,A,f,v,dir,FN,FT,Temp\ns,um pp,kHz,mm/s,-,N,N,degC", |t| {
+        format!(
+            "{},{},27.513,{},{},{},{},21",
+            t.time_s,
+            moved(t.amplitude_nm.into(), 3),
+            moved(t.speed_um_s.into(), 3),
+            t.direction,
+            moved(t.normal_mn.into(), 3),
+            moved(t.lateral_un, 6)
+        )
+    });
+    let path = folder.path().join("rows.csv");
+    std::fs::write(&path, &text).unwrap();
+    let said = refused(folder.path(), &text, &["--map", "A=amplitude_pp:um"]);
+    let whole = "A=amplitude_pp:um, t=time:s, f=frequency:kHz, v=speed:mm/s, dir=direction, FN=normal_force:N, FT=lateral_force:N";
+    assert!(said.contains("must be confirmed") && said.contains(whole), "{said}");
+    assert!(said.contains("What --map leaves open"), "{said}");
+    // The unit is in the second row.
+    let part = import(folder.path(), &path, &["--map", "A=amplitude_pp:um, t=time", "--yes"]);
+    same(&part.passes, &truth(false), 0, "the rest is guessed");
+    let all = folder.path().join("all.csv");
+    std::fs::copy(&path, &all).unwrap();
+    let all = import(folder.path(), &all, &["--map", whole]);
+    same(&all.passes, &truth(false), 0, "a whole map");
+    assert!(all.log["not_taken"].to_string().contains("Temp"));
+    // What is set is not guessed as well, time by rows neither.
+    let rows = folder.path().join("set.csv");
+    std::fs::copy(&path, &rows).unwrap();
+    import(folder.path(), &rows, &["--map", "A=amplitude_pp:um", "--set", "time_s=rows", "--yes"]);
+    // All that is missing is reported at once; a position without a speed may be that of a record.
+    let said = refused(folder.path(), "x_mm;fn_n;ft_n\n1;2;3\n2;2;3\n", &["--yes", "--set", "time_s=rows"]);
+    for words in ["amplitude_pp_m is missing", "frequency_hz is missing", "or --series if"] {
+        assert!(said.contains(words), "{words}: {said}");
+    }
+    let twice = format!("{whole}, #8=time:s");
+    let said = refused(folder.path(), &text, &["--map", &twice]);
+    assert!(said.contains("time_s is given more than once") && said.contains("keep one of them"), "{said}");
+    assert!(!said.contains("state what is missing"), "{said}");
+    // A column whose header another one has is named by its number in the map that is printed.
+    let doubled = text.replace(",Temp", ",v");
+    let said = refused(folder.path(), &doubled, &["--map", "A=amplitude_pp:um, #4=speed:mm/s"]);
+    assert!(said.contains("#4=speed:mm/s, t=time:s"), "{said}");
+}
+
+/// A unit in the map that is not that of the header is remarked on; a sign is no other unit.
+#[test]
+fn a_unit_that_contradicts_the_header_is_remarked_on() {
+    let folder = tempfile::tempdir().unwrap();
+    let head = "t (s),A,f [kHz],v_mm_s,dir,Normalkraft (N),FT";
+    let text = lines(&truth(false), head, |t| {
+        format!(
+            "{},{},27.513,{},{},{},{}",
+            t.time_s,
+            moved(t.amplitude_nm.into(), 3),
+            moved(t.speed_um_s.into(), 3),
+            t.direction,
+            moved(t.normal_mn.into(), 3),
+            moved(t.lateral_un, 6)
+        )
+    });
+    let map = |speed: &str, force: &str, lateral: &str| {
+        format!(
+            "t (s)=time:s, A=amplitude_pp:um, f [kHz]=frequency:kHz, v_mm_s=speed:{speed}, dir=direction, \
+             Normalkraft (N)=normal_force:{force}, FT=lateral_force:{lateral}"
+        )
+    };
+    let taken = |name: &str, map: &str| {
+        let path = folder.path().join(name);
+        std::fs::write(&path, &text).unwrap();
+        import(folder.path(), &path, &["--map", map])
+    };
+    let words = "Normalkraft (N): the header says N, the map says mN";
+    let wrong = taken("wrong.csv", &map("m/s", "mN", "mN"));
+    assert_eq!(wrong.passes[0].normal_force_n, 0.247e-3, "nothing is repaired");
+    let said = wrong.log["remarks"].to_string();
+    assert!(said.contains(words), "{said}");
+    assert!(said.contains("v_mm_s: the header says mm/s, the map says m/s"), "{said}");
+    assert!(texts(&wrong.output).1.contains(words));
+    let right = taken("right.csv", &map("mm/s", "N", "N"));
+    assert_eq!(right.log["remarks"].to_string(), "[]");
+    let turned = taken("turned.csv", &map("mm/s", "N", "-N"));
+    assert!(!turned.log["remarks"].to_string().contains("the header says"), "{}", turned.log["remarks"]);
+    // Where the wrong unit makes the rows impossible, the refusal names it.
+    let said = refused(folder.path(), &text, &["--map", &map("mm/s", "mN", "N")]);
+    assert!(said.contains("0 of 24 rows can be taken") && said.contains(words), "{said}");
+}
+
+/// German dates and headers; ambiguous dates stay refused.
+#[test]
+fn german_dates_ways_and_headers_are_read() {
+    let folder = tempfile::tempdir().unwrap();
+    let head = "Uhrzeit\tSchwingungsamplitude Spitze-Spitze in µm\tFrequenz in kHz\tGeschwindigkeit in mm/s\tRichtung\tAnpresskraft in N\tQuerkraft in mN\tReibwert";
+    let text = lines(&truth(false), head, |t| {
+        let second = 86_390 + t.time_s;
+        let (day, s) = (1 + second / 86_400, second % 86_400);
+        let time = format!("{day:02}.03.2024 {:02}:{:02}:{:02},500", s / 3600, s / 60 % 60, s % 60);
+        let way = if t.direction > 0 { "vor" } else { "zurück" };
+        comma(&format!(
+            "T\t{}\t27.513\t{}\t{way}\t{}\t{}\t0.5",
+            moved(t.amplitude_nm.into(), 3),
+            moved(t.speed_um_s.into(), 3),
+            moved(t.normal_mn.into(), 3),
+            moved(t.lateral_un, 3)
+        ))
+        .replacen('T', &time, 1)
+    });
+    let path = folder.path().join("german.txt");
+    std::fs::write(&path, &text).unwrap();
+    same(&import(folder.path(), &path, &["--yes"]).passes, &truth(false), 0, "german");
+    let said = refused(folder.path(), &text.replace(".03.2024", "/03/2024"), &["--yes"]);
+    assert!(said.contains("neither a number nor a time of day"), "{said}");
 }
 
 /// Units that slipped by a thousand or a million are remarked on, never repaired; so are magnitudes in both directions.

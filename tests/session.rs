@@ -134,8 +134,8 @@ fn a_trip_is_told_with_its_unit_and_its_remedy() {
 fn bad_input_is_refused_with_its_place_and_nothing_is_touched() {
     let folder = tempfile::tempdir().unwrap();
     let cases = [
-        ("[base]", "[bass]", "unknown field"),
-        ("speed_m_s = 0.02", "speed_m_s = 0.02\nspeed = 1", "unknown field"),
+        ("[base]", "[bass]", "the key bass is not known"),
+        ("speed_m_s = 0.02", "speed_m_s = 0.02\nspeed = 1", "speed is not known"),
         ("[0.5e-6, 1e-6, 2e-6, 3e-6]", "[0.5e-6, 1e-3]", "outside what this rig allows"),
         ("frequency_hz = 27500", "frequency_hz = nan", "outside what this rig allows"),
         ("measure_s = 0.1", "measure_s = 10.0", "needs"),

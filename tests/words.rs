@@ -24,6 +24,29 @@ fn the_reference_is_that_of_the_code() {
     );
 }
 
+/// With `--json` what prints a text or writes files answers with one document.
+#[test]
+fn texts_and_files_are_documents_with_json() {
+    let folder = tempfile::tempdir().unwrap();
+    let said = |words: &[&str]| {
+        let output = muprime().arg("--json").args(words).current_dir(folder.path()).output().unwrap();
+        let said = documents(&output);
+        assert_eq!((said.len(), output.status.code()), (1, Some(0)), "{words:?}: {:?}", texts(&output));
+        said[0].clone()
+    };
+    for words in [&["init", "plan"][..], &["completions", "bash"]] {
+        assert!(said(words)["text"].as_str().unwrap().lines().count() > 10, "{words:?}");
+    }
+    for words in [&["init", "plan", "--out", "plan.toml"][..], &["man", "pages"]] {
+        let written = said(words)["written"].as_array().unwrap().clone();
+        assert!(written.len() > 1, "{written:?}");
+        assert!(
+            written.iter().all(|path| folder.path().join(path.as_str().unwrap()).is_file()),
+            "{written:?}"
+        );
+    }
+}
+
 /// Every key anywhere in a schema, found without the page's own walk.
 fn keys(schema: &Value, into: &mut BTreeSet<String>) {
     match schema {

@@ -138,9 +138,10 @@ fn main() -> ExitCode {
     // Places are named in records, catalogues and JSON, all of which are text.
     let unreadable =
         std::env::args_os().chain(std::env::var_os("MUPRIME_RUNS")).find(|a| a.to_str().is_none());
+    let wants_json = || std::env::args_os().any(|a| a == "--json");
     if let Some(argument) = unreadable {
-        say!("{} is not text in UTF-8: give the file or folder another name", argument.display());
-        return ExitCode::from(cli::REFUSED);
+        let (help, shown) = ("give the file or folder another name", argument.display());
+        return refused(&miette::miette!(help = help, "{shown} is not text in UTF-8"), wants_json());
     }
     let cli = match parsed(std::env::args_os()) {
         Ok(cli) => cli,
@@ -148,11 +149,8 @@ fn main() -> ExitCode {
             if error.kind() == ErrorKind::DisplayVersion {
                 return say_version();
             }
-            if error.use_stderr() && std::env::args().any(|a| a == "--json") {
-                let message = cli::plain(&error.to_string());
-                answer_json(
-                    &json!({ "error": message.lines().next().unwrap_or_default(), "status": cli::REFUSED }),
-                );
+            if error.use_stderr() && wants_json() {
+                answer_json(&usage_error(&error));
             }
             let message = error.render().to_string();
             match cli::plain(&message) {
@@ -166,8 +164,8 @@ fn main() -> ExitCode {
     let filter: Targets = match wanted.parse() {
         Ok(filter) => filter,
         Err(error) => {
-            say!("MUPRIME_LOG={wanted}: {error}; a level, or as in 'warn,muprime_drivers=debug'");
-            return ExitCode::from(cli::REFUSED);
+            let help = "give a level, or parts with levels, as in 'warn,muprime_drivers=debug'";
+            return refused(&miette::miette!(help = help, "MUPRIME_LOG={wanted}: {error}"), cli.json);
         }
     };
     let colours = std::io::stderr().is_terminal();
@@ -214,29 +212,63 @@ fn run(verb: Verb, json: bool) -> ExitCode {
         Verb::Dashboard(args) => cli::dashboard::run(args, json),
         Verb::Watch(args) => cli::watch::run(args, json),
         Verb::Schema(args) => cli::schema::run(&args),
-        Verb::Init(args) => cli::init::run(&args),
+        Verb::Init(args) => cli::init::run(&args, json),
         Verb::Show(args) => cli::show::run(&args, json),
         Verb::Doc(args) => cli::doc::run(&args, json),
-        Verb::Man(args) => cli::man::run(&args, &command()),
-        Verb::Completions(args) => cli::completions::run(&args, &mut command()),
+        Verb::Man(args) => cli::man::run(&args, &command(), json),
+        Verb::Completions(args) => cli::completions::run(&args, &mut command(), json),
     });
     match outcome {
         Ok(Ok(code)) => code,
-        Ok(Err(report)) => {
-            let status = cli::status_of(&report);
+        Ok(Err(report)) => refused(&report, json),
+        Err(_) => {
             if json {
-                let causes: Vec<String> =
-                    report.chain().skip(1).map(|c| cli::plain(&c.to_string())).collect();
-                let help = report.help().map(|h| h.to_string());
+                let help = "report it: standard error says where it happened";
                 answer_json(&json!({
-                    "error": cli::plain(&report.to_string()), "causes": causes, "help": help, "status": status
+                    "error": "a fault of the program", "causes": [], "help": help, "status": cli::INTERNAL
                 }));
             }
-            say!("{}", cli::plain(&format!("{report:?}")));
-            ExitCode::from(status)
+            ExitCode::from(cli::INTERNAL)
         }
-        Err(_) => ExitCode::from(cli::INTERNAL),
     }
+}
+
+/// Says an error on standard error, and with `--json` as a document.
+fn refused(report: &miette::Report, json: bool) -> ExitCode {
+    let status = cli::status_of(report);
+    if json {
+        let causes: Vec<String> = report.chain().skip(1).map(|c| cli::plain(&c.to_string())).collect();
+        // Of several problems each has a help of its own.
+        let mut helps: Vec<String> =
+            tables::check::problems_of(report).into_iter().filter_map(|p| p.help).collect();
+        helps.dedup();
+        let help = (!helps.is_empty()).then(|| helps.join("; "));
+        answer_json(&json!({
+            "error": cli::plain(&report.to_string()), "causes": causes, "help": help, "status": status
+        }));
+    }
+    say!("{}", cli::plain(&format!("{report:?}")));
+    ExitCode::from(status)
+}
+
+/// A command line that cannot be read, as a document: the first paragraph is the error, tips and usage are
+/// the help.
+fn usage_error(error: &clap::Error) -> serde_json::Value {
+    let text = cli::plain(&error.to_string());
+    let joined = |part: &str| part.split_whitespace().collect::<Vec<_>>().join(" ");
+    let mut parts = text.split("\n\n");
+    let (what, help) = match error.kind() {
+        ErrorKind::DisplayHelpOnMissingArgumentOrSubcommand => {
+            ("the command is incomplete".to_string(), "add `--help`: it lists what is missing".to_string())
+        }
+        _ => {
+            let first = joined(parts.next().unwrap_or_default());
+            let helps = parts.map(joined).filter(|part| !part.starts_with("For more information"));
+            let what = first.strip_prefix("error: ").unwrap_or(&first).to_string();
+            (what, helps.collect::<Vec<_>>().join("; "))
+        }
+    };
+    json!({ "error": what, "causes": [], "help": help, "status": cli::REFUSED })
 }
 
 #[cfg(test)]
@@ -270,6 +302,27 @@ mod tests {
         }
         all.push(now);
         all.into_iter().filter(|w| !w.is_empty()).map(Into::into).collect()
+    }
+
+    #[test]
+    fn a_command_line_that_cannot_be_read_is_a_whole_document() {
+        let document = |line: &str| usage_error(&parsed(words(line)).err().expect("it cannot be read"));
+        for (line, error, help) in [
+            ("muprime --json rum", "unrecognized subcommand 'rum'", "'runs', 'run'; Usage: muprime"),
+            (
+                "muprime run --sed 3",
+                "unexpected argument '--sed' found",
+                "a similar argument exists: '--seed'",
+            ),
+            ("muprime check", "required arguments were not provided: <FILES>", "Usage: muprime check"),
+            ("muprime model", "the command is incomplete", "--help"),
+        ] {
+            let document = document(line);
+            assert!(document["error"].as_str().unwrap().contains(error), "{line}: {document}");
+            assert!(!document["error"].as_str().unwrap().starts_with("error"), "{line}: {document}");
+            assert!(document["help"].as_str().unwrap().contains(help), "{line}: {document}");
+            assert_eq!((&document["causes"], &document["status"]), (&json!([]), &json!(2)), "{line}");
+        }
     }
 
     fn pages(command: &mut clap::Command, pages: &mut Vec<String>) {

@@ -95,6 +95,33 @@ pub fn keep_unread() {
     }
 }
 
+/// The setup of that name or path.
+///
+/// # Errors
+/// It cannot be used: all that is wrong with it, with places and remedies.
+pub fn setup(name: &str) -> miette::Result<::runs::setup::Setup> {
+    ::runs::setup::Setup::load(name).map_err(|why| tables::check::refusal(why, name, "setup"))
+}
+
+/// The plan of that name or path.
+///
+/// # Errors
+/// As [`setup`].
+pub fn plan(name: &str) -> miette::Result<::runs::plan::Plan> {
+    ::runs::plan::Plan::load(name).map_err(|why| tables::check::refusal(why, name, "plan"))
+}
+
+/// The defects of a file.
+///
+/// # Errors
+/// As [`setup`].
+pub fn defects(path: &Path) -> miette::Result<sim::defects::Defects> {
+    let text = ::runs::input::text_of(path)?;
+    sim::defects::Defects::parse(&text).map_err(|why| {
+        tables::check::refusal(miette::Report::msg(why), &path.display().to_string(), "defects file")
+    })
+}
+
 /// What a person named is there.
 ///
 /// # Errors
@@ -102,6 +129,7 @@ pub fn keep_unread() {
 pub fn there(path: &Path, what: &str) -> miette::Result<()> {
     const RUN: [&str; 5] = ["points.csv", ::runs::run_dir::JOURNAL, "run.toml", "run-1.mcap", "sessions"];
     if path.is_dir() && what.starts_with("run") && !RUN.iter().any(|name| path.join(name).exists())
+        || what == "run" && path.is_file()
         || !path.exists()
     {
         return Err(not_there(path, what));
@@ -121,6 +149,7 @@ fn not_there(path: &Path, what: &str) -> miette::Report {
         .collect();
     runs.sort();
     let help = match runs.as_slice() {
+        _ if path.is_file() => "a run is a folder: give the one that the file is in".to_string(),
         [] => format!("there are no runs in {}; muprime run makes one", folder.display()),
         all => format!("runs here: {}", all.iter().rev().take(8).cloned().collect::<Vec<_>>().join(", ")),
     };
@@ -175,6 +204,38 @@ mod tests {
         ] {
             assert_eq!(plain(error), better);
         }
+    }
+
+    #[test]
+    fn a_file_is_no_run() {
+        let why = there(Path::new("Cargo.toml"), "run").unwrap_err();
+        assert_eq!(why.to_string(), "there is no run at 'Cargo.toml'");
+        assert!(why.help().unwrap().to_string().contains("a run is a folder"));
+        assert!(there(Path::new("Cargo.toml"), "run or table").is_ok());
+    }
+
+    #[test]
+    fn a_plan_that_cannot_be_read_is_refused_with_all_that_is_wrong() {
+        let folder = tempfile::tempdir().unwrap();
+        let path = folder.path().join("plan.toml");
+        let good = ::runs::bundled::text(::runs::plan::BUNDLED, "first-sweep").unwrap();
+        let refused = |text: &str| {
+            std::fs::write(&path, text).unwrap();
+            tables::check::problems_of(&plan(path.to_str().unwrap()).unwrap_err())
+        };
+        let problems = refused(&good.replacen("settle_s", "setle_s", 1).replacen(
+            "reference_every",
+            "reference_evry",
+            1,
+        ));
+        let mut helps: Vec<_> = problems.iter().filter_map(|p| p.help.as_deref()).collect();
+        helps.sort_unstable();
+        assert_eq!(helps, ["did you mean `reference_every`?", "did you mean `settle_s`?"], "{problems:?}");
+        let problems = refused("");
+        assert!(problems.iter().any(|p| p.problem == "the key name is missing"), "{problems:?}");
+        assert!(problems.iter().all(|p| p.help.is_some()), "{problems:?}");
+        let setup = ::runs::bundled::text(::runs::setup::BUNDLED, "virtual-ideal").unwrap();
+        assert!(refused(setup)[0].problem.contains("is a setup; a plan is needed"));
     }
 
     #[test]

@@ -1,4 +1,4 @@
-//! What a verdict says of the certificates that stand beside the table in rig.toml.
+//! What a verdict says of the certificates that rig.toml names beside the table.
 
 use crate::Verdict;
 use crate::pulls::Pull;
@@ -7,11 +7,15 @@ use models::rig_file::RigFile;
 use serde::Serialize;
 
 /// A certificate that speaks for an instrument which is blamed nevertheless.
-#[derive(Debug, Serialize)]
+#[derive(Debug, Serialize, schemars::JsonSchema)]
 pub struct AtFault {
+    /// The leading cause.
     effect: &'static str,
+    /// What the certificate bounds, in words.
     quantity: &'static str,
+    /// The certificate and its file, in words.
     certificate: String,
+    /// Standard uncertainty that it leaves, in the unit of its key in rig.toml.
     stated_sd: f64,
 }
 
@@ -19,8 +23,8 @@ impl AtFault {
     /// For a terminal.
     pub fn text(&self) -> String {
         format!(
-            "The {} leaves a standard uncertainty of {:.2e} for the {}, and the data want it beyond ({}): it is at \
-             fault, or something changed since. Calibrate again.",
+            "The {} leaves a standard uncertainty of {:.2e} for the {}, and the data exceed it ({}): the certificate \
+             is wrong, or something changed since. Calibrate again.",
             self.certificate, self.stated_sd, self.quantity, self.effect
         )
     }
@@ -42,11 +46,15 @@ pub fn at_fault(result: &Diagnosis, rig: &RigFile) -> Vec<AtFault> {
 }
 
 /// A certificate whose error a stiffness would have taken up, where a stiffness was pulled off its calibration.
-#[derive(Debug, Serialize)]
+#[derive(Debug, Serialize, schemars::JsonSchema)]
 pub struct InDoubt {
+    /// The certificate and its file, in words.
     certificate: String,
+    /// The stiffness that was pulled: `normal_stiffness` or `lateral_stiffness`.
     quantity: &'static str,
+    /// How far, in standard deviations.
     pull_sd: f64,
+    /// The instrument's error that looks the same.
     imitates: &'static str,
 }
 

@@ -1,4 +1,17 @@
 //! From probabilities to a verdict and its alias class. docs/diagnosis/model.md, section 9.
+//!
+//! [`decide`] takes the steps in the order of that page:
+//!
+//! 1. `fold_pairs`: a pair that says little more than a member gives its weight to it.
+//! 2. `judged`: the leader predicts regions that it has not seen ([`crate::left_out`]).
+//! 3. What survives of the probabilities; the rest goes to the open set.
+//! 4. `alias_class`, `departed_singles`, `placed_singles`, `renamed`: what the table does not separate from
+//!    the leader.
+//! 5. `doubted`: the share of the chance that the method errs.
+//! 6. The verdict.
+//!
+//! The leader is the most probable cause or pair after step 1; its class begins with it. Evidence is never
+//! changed here.
 
 use crate::bases::Bends;
 use crate::departure::Freedom;
@@ -99,7 +112,7 @@ pub fn decide(fitted: &mut Fitted) -> Decision {
     let alone = k.alone_share[usize::from(candidates[leader].effects.len() > 1)];
     // Priors alone make no name: a rival whose forces are the same must differ in the data.
     let distinct = imitated(&candidates[leader].names()).is_none()
-        && class[1..].iter().all(|&i| !same_said(fitted, leader, i))
+        && class[1..].iter().all(|&i| !same_forces(fitted, leader, i))
         && departed.is_empty()
         && renamed.is_empty();
     class.extend(departed);
@@ -199,7 +212,7 @@ fn alias_class(fitted: &Fitted, leader: usize) -> Vec<usize> {
         let behind = own.log_evidence - candidates[i].log_evidence;
         i != leader
             && candidates[i].effects.len() == own.effects.len()
-            && (behind < k.alias_nats || behind < k.prior_nats && same_said(fitted, leader, i))
+            && (behind < k.alias_nats || behind < k.prior_nats && same_forces(fitted, leader, i))
     }));
     class
 }
@@ -279,7 +292,7 @@ fn renamed(fitted: &Fitted, leader: usize, class: &[usize]) -> Vec<usize> {
 }
 
 /// Whether a rival says the same as the leader with no more parameters.
-fn same_said(fitted: &Fitted, leader: usize, rival: usize) -> bool {
+fn same_forces(fitted: &Fitted, leader: usize, rival: usize) -> bool {
     let [a, b] = [leader, rival].map(|i| &fitted.candidates[i].best);
     let apart = fitted.problem.chi2(&(&a.mechanism - &b.mechanism));
     b.u.len() <= a.u.len() && apart < fitted.problem.constants.same_forces_chi2

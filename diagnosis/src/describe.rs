@@ -36,6 +36,13 @@ pub struct Description {
     pub text: String,
 }
 
+impl Description {
+    /// Whether no cause of the library is likelier than this structure.
+    pub fn leads(&self) -> bool {
+        self.log10_odds_vs_best_cause.is_none_or(|odds| odds >= 0.0)
+    }
+}
+
 /// A name of a cause, a pair or a parameter as a sentence has it.
 pub fn plain(name: &str) -> String {
     name.replace(" + ", "+").replace('+', " + ").replace('_', " ")
@@ -91,6 +98,23 @@ pub fn description(fitted: &Fitted, decision: &Decision) -> Vec<Description> {
     };
     let seen = fitted.shapes.iter().map(of);
     seen.take_while(|d| d.log10_odds_vs_no_gap > LEAST_ODDS).take(MOST).collect()
+}
+
+/// The likeliest cause under `unknown`, and why it is not named; none where no effect could be tried.
+pub fn not_named(fitted: &Fitted, decision: &Decision) -> Option<String> {
+    let leader = &fitted.candidates[decision.leader()?];
+    let (gate, k) = (&decision.gate, &fitted.problem.constants);
+    let why = if fitted.unknown_probability > leader.probability {
+        "a smooth departure without a known cause fits the table better".to_string()
+    } else if gate.survival(k, leader.effects.len(), fitted.lead(leader)) < 0.5 {
+        let percent = 100.0 * gate.pooled.max(0.0);
+        format!("in regions that its fit leaves out, it closes only {percent:.0} % of the gap")
+    } else if leader.best.plain.is_some() {
+        "its law, without a free function beside it, explains too little of the gap".to_string()
+    } else {
+        "a departure without a known cause is as likely".to_string()
+    };
+    Some(format!("The likeliest cause is {}. It is not named: {why}.", plain(&leader.names().join("+"))))
 }
 
 /// Causes that are sure though the verdict is open: those of which the hypotheses together have the

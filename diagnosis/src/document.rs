@@ -1,29 +1,38 @@
 //! The verdict as a document: the JSON of `muprime diagnose --json`, and its predictions.
 
-use crate::certificates;
+use crate::certificates::{AtFault, InDoubt, at_fault, in_doubt};
 use crate::data::Table;
 use crate::unstated::Unstated;
-use crate::verdict::Diagnosis;
+use crate::verdict::{Diagnosis, Report};
 use models::rig_file::RigFile;
+use serde::Serialize;
 
-/// The verdict as `--json` prints it: the report, what is damaged in the run's folder, and the certificates that it speaks against.
+/// Schema `muprime.verdict/1`: what `muprime diagnose --json` prints.
+#[derive(Debug, Serialize, schemars::JsonSchema)]
+pub struct Document<'a> {
+    #[serde(flatten)]
+    report: &'a Report,
+    /// What is damaged in the run's folder; left out where nothing is.
+    #[serde(skip_serializing_if = "<[_]>::is_empty")]
+    damage: &'a [String],
+    /// Certificates that bound the leading cause, against the data; left out where there is none.
+    #[serde(skip_serializing_if = "Vec::is_empty")]
+    certificates_at_fault: Vec<AtFault>,
+    /// Certificates whose error would pull a stiffness as this table does; left out where there is none.
+    #[serde(skip_serializing_if = "Vec::is_empty")]
+    certificates_in_doubt: Vec<InDoubt>,
+}
+
+/// The verdict as `--json` prints it: a [`Document`] with its keys in the order of the alphabet.
 ///
 /// # Errors
 /// Only if a number cannot be written as JSON.
 pub fn document(result: &Diagnosis, rig: &RigFile, damage: &[String]) -> serde_json::Result<String> {
-    let mut report = serde_json::to_value(&result.report)?;
-    let faults = certificates::at_fault(result, rig);
-    let doubts = certificates::in_doubt(rig, &result.report.stiffness_pulls);
-    if !damage.is_empty() {
-        report["damage"] = serde_json::to_value(damage)?;
-    }
-    if !faults.is_empty() {
-        report["certificates_at_fault"] = serde_json::to_value(&faults)?;
-    }
-    if !doubts.is_empty() {
-        report["certificates_in_doubt"] = serde_json::to_value(&doubts)?;
-    }
-    serde_json::to_string(&report)
+    let report = &result.report;
+    let (certificates_at_fault, certificates_in_doubt) =
+        (at_fault(result, rig), in_doubt(rig, &report.stiffness_pulls));
+    let whole = Document { report, damage, certificates_at_fault, certificates_in_doubt };
+    serde_json::to_string(&serde_json::to_value(whole)?)
 }
 
 /// What `--predictions` holds: CSV, a row a condition; empty cells where the base law cannot tell.

@@ -1,4 +1,17 @@
 //! The hypotheses and the order of their fits. docs/diagnosis/model.md, section 4.
+//!
+//! [`fit_all`] fits once with the scatter as it is judged, and once more with independent scatter where
+//! lasting scatter may be a cause in disguise. [`fit_believing`] is one such fit, in this order:
+//!
+//! ```text
+//! scatter (noise, scatter) -> no gap -> singles -> lapsed certificates -> passes judged about the leader,
+//! begin again?
+//!   -> unlisted causes -> pairs, their members again -> structure and shapes -> Fitted
+//! ```
+//!
+//! `Candidate` is a hypothesis with its evidence, `Posterior` the mode of one law, `Fitted` all of them with
+//! the table as it was believed. `Belief` says which passes belong; `Search` is what every search shares.
+//! Nothing here decides: that is [`crate::decision`].
 
 use crate::bases::{Basis, Kernels};
 use crate::constants::Constants;

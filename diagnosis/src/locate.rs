@@ -10,7 +10,7 @@ use effects::Location;
 use models::condition::Condition;
 use models::covariate;
 use models::quantity::PeakToPeak;
-use partition::{cuts, named_parts, parts};
+use partition::{cuts, levels, named_parts, parts};
 use serde::Serialize;
 use statrs::distribution::{ChiSquared, ContinuousCDF};
 use std::collections::BTreeMap;
@@ -26,6 +26,9 @@ pub struct Region {
     pub p_value: f64,
     /// In words.
     pub text: String,
+    /// Whether a pass lies inside; the text says where none does.
+    #[serde(skip)]
+    pub measured: bool,
 }
 
 /// Probability by place; `unknown` is the open set's.
@@ -76,7 +79,7 @@ pub fn regions(fitted: &Fitted, rig: &RigFile, model: &Model) -> Vec<Region> {
     let residual: Vec<f64> = (0..n)
         .map(|i| (problem.lateral[i] - fitted.none.prediction[i]).powi(2) / problem.whole_variance(i))
         .collect();
-    let cuts = cuts(&places);
+    let cuts = cuts(&problem.passes, &places);
     let tries: f64 = cuts.iter().map(|c| 2.0 * c.at.len() as f64).sum::<f64>().max(1.0);
     let mut found: Vec<Region> = named_parts(&parts(&cuts, &chance), &chance)
         .into_iter()
@@ -114,18 +117,20 @@ fn region(
     for (k, b) in bounds {
         let covariate = covariate::COVARIATES[*k];
         // An open side ends where the table does.
-        let (low, high) = passes
-            .iter()
-            .filter_map(|p| covariate.of(p))
-            .fold((f64::INFINITY, f64::NEG_INFINITY), |(a, c), v| (a.min(v), c.max(v)));
+        let (word, (scale, unit)) = (covariate.words, covariate.shown);
+        let seen: Vec<f64> = passes.iter().filter_map(|p| covariate.of(p)).collect();
+        let (low, high) =
+            seen.iter().fold((f64::INFINITY, f64::NEG_INFINITY), |(a, c), v| (a.min(*v), c.max(*v)));
         let slack = 0.02 * (high - low);
         let low = if low >= 0.0 { (low - slack).max(0.0) } else { low - slack };
         let high = high + slack;
         let low = if b[0].is_finite() { b[0] } else { low };
         let high = if b[1].is_finite() { b[1] } else { high };
         named.insert(covariate.name, [low, high]);
-        let (word, (scale, unit)) = (covariate.words, covariate.shown);
-        let (low, high) = (low * scale, high * scale);
+        let bound = |value: f64, end: f64| {
+            let seen: Vec<f64> = seen.iter().map(|v| v * scale).collect();
+            short(value * scale, &seen, end * scale)
+        };
         let words_of = match (b[0].is_finite(), b[1].is_finite()) {
             (forward, _) if covariate.name == covariate::DIRECTION.name => {
                 if forward {
@@ -134,9 +139,9 @@ fn region(
                     "backward".into()
                 }
             }
-            (true, true) => format!("{word} {} to {} {unit}", short(low), short(high)),
-            (true, false) => format!("{word} above {} {unit}", short(low)),
-            _ => format!("{word} below {} {unit}", short(high)),
+            (true, true) => format!("{word} {} to {} {unit}", bound(low, high), bound(high, low)),
+            (true, false) => format!("{word} above {} {unit}", bound(low, b[1])),
+            _ => format!("{word} below {} {unit}", bound(high, b[0])),
         };
         words.push(words_of.trim_end().to_string());
     }
@@ -152,14 +157,30 @@ fn region(
         Some(p) if p < 0.01 => format!("{percent:.0} % of the gap: {place} (p = {p:.1e})"),
         Some(p) => format!("{percent:.0} % of the gap: {place} (p = {p:.2})"),
     };
-    Region { bounds: named, share_of_gap: share, p_value: p_value.unwrap_or(1.0), text }
+    let (p_value, measured) = (p_value.unwrap_or(1.0), p_value.is_some());
+    Region { bounds: named, share_of_gap: share, p_value, text, measured }
 }
 
-/// A number with two significant digits, and all digits before its point.
-fn short(value: f64) -> String {
-    let decimals = (1 - value.abs().max(1e-9).log10().floor() as i32).clamp(0, 9) as usize;
-    let text = format!("{value:.decimals$}");
-    if text.contains('.') { text.trim_end_matches('0').trim_end_matches('.').into() } else { text }
+/// A bound with two significant digits and all digits before its point; with a third one where two could
+/// move it past a pass that was `seen`, and with as many as part it from the region's other `end`.
+fn short(value: f64, seen: &[f64], end: f64) -> String {
+    let decimals = 1 - value.abs().max(1e-9).log10().floor() as i32;
+    let end = (end - value).abs();
+    let mut nearest = seen.iter().map(|v| (v - value).abs()).fold(end, f64::min);
+    for decimals in decimals.clamp(0, 9)..9 {
+        let text = format!("{value:.*}", decimals as usize);
+        let moved = text.parse::<f64>().map_or(0.0, |printed| (printed - value).abs());
+        if moved < 0.5 * nearest || moved == 0.0 {
+            return trimmed(&text);
+        }
+        nearest = end;
+    }
+    trimmed(&format!("{value:.9}"))
+}
+
+/// A number without zeros behind its point.
+fn trimmed(text: &str) -> String {
+    if text.contains('.') { text.trim_end_matches('0').trim_end_matches('.').into() } else { text.into() }
 }
 
 /// Conditions of the same design: what can be set is drawn independently, from the table's levels or from
@@ -167,11 +188,8 @@ fn short(value: f64) -> String {
 fn conditions_between(passes: &[Condition], count: usize) -> Vec<Condition> {
     let mut state = 0x5DEE_CE66_D2B7_4F1D_u64;
     let mut uniform = || (crate::draws::split_mix(&mut state) >> 11) as f64 / (1u64 << 53) as f64;
-    let levels = |value: fn(&Condition) -> f64| {
-        let mut list: Vec<f64> = passes.iter().map(value).filter(|v| *v > 0.0).collect();
-        list.sort_by(f64::total_cmp);
-        list.dedup_by(|a, b| *a <= *b * 1.02);
-        list
+    let levels = |value: fn(&Condition) -> f64| -> Vec<f64> {
+        levels(passes.iter().map(value).collect()).iter().map(|[low, _]| *low).collect()
     };
     let (amplitudes, speeds, loads) =
         (levels(|p| p.amplitude.metres()), levels(|p| p.speed_m_s), levels(|p| p.normal_force_n));

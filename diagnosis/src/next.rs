@@ -16,6 +16,7 @@ use crate::describe::plain;
 use crate::fitted::Fitted;
 use models::condition::Condition;
 use models::covariate;
+use models::prediction::SpringSlider;
 use predictive::predictives;
 use serde::{Serialize, Serializer};
 use std::collections::BTreeMap;
@@ -45,6 +46,10 @@ fn settings<S: Serializer>(conditions: &[Condition], serializer: S) -> Result<S:
 
 /// Passes of a designed experiment.
 pub const PASSES: usize = 12;
+/// Least change of force that a proposal is made for, in deviations of a pass (`force_sd_n`). A run refuses
+/// a series below one; twice that, since the setup's mu_0 may differ from the table's.
+const SEEN: f64 = 2.0;
+
 /// Odds that are expected of an experiment.
 pub fn odds(nats: f64) -> String {
     if nats > 6.0 * std::f64::consts::LN_10 {
@@ -61,37 +66,55 @@ pub fn experiments(fitted: &Fitted, table: &Table, rig: &RigFile, decision: &Dec
     if decision.verdict == Verdict::NoGap && decision.none >= k.settled_probability {
         return Vec::new();
     }
-    let mut list = Vec::new();
+    let mut list: Vec<Experiment> = designed(fitted, table, rig, decision).into_iter().collect();
+    if decision.verdict != Verdict::NoGap {
+        list.extend(actions(fitted, decision));
+    }
+    list.sort_by(|x, y| y.expected_nats.total_cmp(&x.expected_nats));
+    list
+}
+
+/// A hypothesis of [`Experiment::separates`] as a sentence has it.
+pub fn words(name: &str) -> String {
+    if name == "unknown" { "an unknown cause".to_string() } else { plain(name) }
+}
+
+/// The passes that best part the hypotheses, among conditions whose change of force a run on this rig
+/// accepts.
+fn designed(fitted: &Fitted, table: &Table, rig: &RigFile, decision: &Decision) -> Option<Experiment> {
+    let k = &fitted.problem.constants;
     let mut grid = grid::conditions(table);
     grid.retain(|c| fitted.problem.tells(c));
+    let (all, least_n) = (grid.len(), SEEN * rig.noise.force_sd_n);
+    if let Ok(slider) = SpringSlider::new(rig.finger) {
+        let change = |c: &Condition| grid::expected_change_n(c, &slider, fitted.problem.nominal.mu0);
+        grid.retain(|c| change(c).is_none_or(|n| n >= least_n));
+    }
+    if grid.is_empty() {
+        return None;
+    }
     let hypotheses = predictives(fitted, rig, decision, &grid);
     // Where the evidence is for an effect and the left-out regions are against it, passes that part hypotheses come back to
     // a few conditions and leave the regions as empty as they are. Every second one then goes where nothing is known.
     let empty = decision.unknown > 0.5 && fitted.unknown_probability < 0.5;
     let open = hypotheses.len() - 1;
     let chosen = design::greedy(&hypotheses, PASSES, empty.then_some(open), k.design_pass_nats);
-    if let Some(rival) = design::rival(&hypotheses, &chosen) {
-        let nats = design::expected_nats(&hypotheses[0], &hypotheses[rival], &chosen);
-        let names = [hypotheses[0].name.clone(), hypotheses[rival].name.clone()];
-        if nats > k.design_least_nats {
-            list.push(Experiment {
-                conditions: chosen.iter().map(|&i| grid[i]).collect(),
-                text: format!(
-                    "{PASSES} more passes would separate {} from {} and the rest ({} expected)",
-                    plain(&names[0]),
-                    plain(&names[1]),
-                    odds(nats)
-                ),
-                separates: names,
-                expected_nats: nats,
-            });
-        }
+    let rival = design::rival(&hypotheses, &chosen)?;
+    let nats = design::expected_nats(&hypotheses[0], &hypotheses[rival], &chosen);
+    let separates = [hypotheses[0].name.clone(), hypotheses[rival].name.clone()];
+    let [leader, other] = separates.each_ref().map(|name| words(name));
+    let mut text = format!(
+        "{PASSES} more passes would distinguish {leader} from {other} and from the other causes ({} expected).",
+        odds(nats)
+    );
+    if grid.len() < all {
+        text.push_str(&format!(
+            " Conditions that change the force by less than {:.2} mN are left out: the sensor hardly sees them.",
+            1e3 * least_n
+        ));
     }
-    if decision.verdict != Verdict::NoGap {
-        list.extend(actions(fitted, decision));
-    }
-    list.sort_by(|x, y| y.expected_nats.total_cmp(&x.expected_nats));
-    list
+    let conditions = chosen.iter().map(|&i| grid[i]).collect();
+    (nats > k.design_least_nats).then_some(Experiment { conditions, separates, expected_nats: nats, text })
 }
 
 /// Actions on instruments that part the leader from the next candidate.

@@ -88,10 +88,10 @@ impl std::fmt::Display for Answer {
         f.write_str(match self.parts.as_slice() {
             [(_, Which::Baseline)] => "the recalibrated baseline",
             [(_, Which::Cause(i))] if self.leader == Some(*i) => "the leading cause",
-            [(_, Which::Cause(_))] => "the hypothesis with the most evidence",
+            [(_, Which::Cause(_))] => "the likeliest model",
             [(_, Which::Open)] => "a smooth map",
             [(_, Which::Shape(_))] => "the first shape described",
-            _ => "the mean of the hypotheses with the most evidence",
+            _ => "the average of the likeliest models",
         })
     }
 }

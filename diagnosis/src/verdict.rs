@@ -2,7 +2,7 @@
 
 use crate::data::{RigFile, Table};
 use crate::decision::{Decision, Verdict, decide};
-use crate::describe::{Description, at_least, description, plain, probability};
+use crate::describe::{Description, at_least, description, not_named, plain, probability};
 use crate::hypotheses::{Fitted, Options, fit_all};
 use crate::intervals::{Estimate, curvature, estimates};
 use crate::law::LawNote;
@@ -321,7 +321,9 @@ fn sentence(fitted: &Fitted, decision: &Decision, gap: &Gap, answer: &Answer) ->
                     let names = plain(&s.names().join("+"));
                     format!(" The nearest known effect is not in the library: {names}.")
                 }
-                (None, Some(d)) => format!(" It looks like {}.", d.text),
+                (None, Some(d)) if d.leads() => format!(" It looks like {}.", d.text),
+                // The best cause is likelier than any structure: the sentence names no structure then.
+                (None, Some(_)) => not_named(fitted, decision).map_or_else(String::new, |s| format!(" {s}")),
                 (None, None) => String::new(),
             };
             format!(

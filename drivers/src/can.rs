@@ -68,7 +68,7 @@ struct Group {
     request: Option<(CanFrame, Periodic)>,
     bytes: Vec<u8>,
     next: usize,
-    asked_at: Option<Instant>,
+    requested_at: Option<Instant>,
 }
 
 fn groups(session: &Session, base: u32, rate_hz: Option<f64>) -> Vec<Group> {
@@ -88,7 +88,7 @@ fn groups(session: &Session, base: u32, rate_hz: Option<f64>) -> Vec<Group> {
             request: request.map(|request| (request, periodic)),
             bytes: Vec::new(),
             next: 0,
-            asked_at: None,
+            requested_at: None,
         })
     };
     frames.filter_map(group).collect()
@@ -103,7 +103,7 @@ fn converse(
     let limit_ms = session.endpoint.profile().description.link.response_timeout_ms;
     let limit = Duration::from_millis(u64::from(limit_ms));
     let mut groups = groups(session, base, rate_hz);
-    // What an earlier connection was still owed comes now or never.
+    // Late answers to an earlier connection are discarded.
     let quiet = Instant::now() + limit;
     while port.receive(quiet)?.is_some() && Instant::now() < quiet {}
     let mut heard = Instant::now();
@@ -113,26 +113,27 @@ fn converse(
         }
         let now = session.now();
         for group in &mut groups {
-            let waiting = group.asked_at.is_some();
+            let waiting = group.requested_at.is_some();
             if let Some((request, periodic)) =
                 group.request.as_mut().filter(|(_, periodic)| !waiting && periodic.is_due(now))
             {
                 (group.next, group.bytes) = (0, Vec::new());
                 if port.send(request)? {
-                    group.asked_at = Some(Instant::now());
+                    group.requested_at = Some(Instant::now());
                 }
                 periodic.advance(now);
             }
-            if group.asked_at.is_some_and(|since| since.elapsed() > limit) {
+            if group.requested_at.is_some_and(|since| since.elapsed() > limit) {
                 return Err(Ended::Timeout(limit_ms));
             }
         }
-        if heard.elapsed() > limit.max(LONGEST_SLEEP) * 5 {
-            return Err(Ended::Timeout(5 * limit_ms));
+        let silence = limit.max(LONGEST_SLEEP) * 5;
+        if heard.elapsed() > silence {
+            return Err(Ended::Timeout(u32::try_from(silence.as_millis()).unwrap_or(u32::MAX)));
         }
         let next = groups
             .iter()
-            .filter_map(|g| g.request.as_ref().filter(|_| g.asked_at.is_none()).map(|(_, p)| p.due))
+            .filter_map(|g| g.request.as_ref().filter(|_| g.requested_at.is_none()).map(|(_, p)| p.due))
             .min();
         let pause = next
             .map_or(LONGEST_SLEEP, |due| Duration::from_nanos(due.since(session.now()).0).min(LONGEST_SLEEP));
@@ -150,7 +151,7 @@ fn converse(
                 for group in &mut groups {
                     if group.take(&frame) {
                         heard = Instant::now();
-                        group.asked_at = None;
+                        group.requested_at = None;
                         let bytes = std::mem::take(&mut group.bytes);
                         group.next = 0;
                         session.endpoint.frame(group.frame, &bytes, arrived)?;
@@ -166,7 +167,7 @@ impl Group {
     /// Takes a frame if it is the next of the sample; says whether the sample is whole.
     fn take(&mut self, frame: &CanFrame) -> bool {
         // An answer without a request, or to one too long ago, is dropped.
-        if self.request.is_some() && self.asked_at.is_none() {
+        if self.request.is_some() && self.requested_at.is_none() {
             return false;
         }
         let Some(place) = (self.parts.iter())
@@ -205,7 +206,7 @@ mod tests {
         let (ready, _opened) = std::sync::mpsc::sync_channel(1);
         let session = Session::new(endpoint, Instant::now(), Arc::default(), ready);
         let mut group = groups(&session, 432, None).remove(0);
-        group.asked_at = Some(Instant::now());
+        group.requested_at = Some(Instant::now());
         group.take(&CanFrame::build(HALVES[0], true, &[9; 8]).unwrap());
         assert!(group.bytes.is_empty(), "another instrument's");
         group.take(&CanFrame::build(HALVES[0], false, &[7; 8]).unwrap());

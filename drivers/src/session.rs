@@ -1,4 +1,9 @@
-//! The life of a link: connect, converse until something is wrong, tell the loop, back off, connect anew.
+//! The life of a link: connect, converse until something is wrong, report to the loop, wait, connect again.
+//!
+//! A session belongs to the link's thread; the loop sees its ports alone and never waits for it. A link that
+//! fails is opened again after a pause that doubles, at once where an 'off' is owed; only a failure of the
+//! first connection goes to whoever opened the rig. After a stop it ends once 'off' is read back, or
+//! `OFF_WITHIN` is over.
 
 use super::ended::{Closed, Ended, OFF_WITHIN};
 use super::endpoint::Endpoint;

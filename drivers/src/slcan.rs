@@ -3,7 +3,7 @@
 use super::ended::Ended;
 use super::serial::Line;
 use instruments::bus::{CanEvent, CanPort};
-use instruments::codec::can::{CanFrame, SlcanReader, SlcanSaid, slcan_line, slcan_speed};
+use instruments::codec::can::{CanFrame, SlcanMessage, SlcanReader, slcan_line, slcan_speed};
 use std::collections::VecDeque;
 use std::io;
 use std::time::{Duration, Instant};
@@ -51,7 +51,7 @@ impl CanPort for Slcan {
             }
             let waiting = &mut self.waiting;
             self.reader.push(&buffer[..count], |message| {
-                if let SlcanSaid::Frame(frame) = message {
+                if let SlcanMessage::Frame(frame) = message {
                     waiting.push_back(frame);
                 }
             });

@@ -80,7 +80,7 @@ struct Talk {
     transport: Transport,
     link: Link,
     came: Vec<u8>,
-    asked_at: Instant,
+    requested_at: Instant,
     /// The line that was sent last.
     request: String,
     sent: HashMap<SetId, (String, Instant)>,
@@ -100,7 +100,7 @@ impl Talk {
             transport,
             link,
             came: Vec::new(),
-            asked_at: Instant::now(),
+            requested_at: Instant::now(),
             request: String::new(),
             sent: HashMap::new(),
             newest: HashMap::new(),
@@ -124,10 +124,10 @@ impl Talk {
 
     fn send(&mut self, line: &str) -> Result<(), Ended> {
         let gap = Duration::from_secs_f64(self.link.min_gap_ms.max(0.0) * 1e-3);
-        std::thread::sleep(gap.saturating_sub(self.asked_at.elapsed()));
+        std::thread::sleep(gap.saturating_sub(self.requested_at.elapsed()));
         let end = self.link.tx_terminator.clone().unwrap_or_else(|| "\n".into());
         self.transport.write(format!("{line}{end}").as_bytes())?;
-        self.asked_at = Instant::now();
+        self.requested_at = Instant::now();
         line.clone_into(&mut self.request);
         Ok(())
     }

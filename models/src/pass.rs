@@ -5,7 +5,7 @@ mod table;
 use crate::condition::Condition;
 use crate::quantity::{Direction, PeakToPeak};
 use serde::{Deserialize, Serialize};
-pub use table::{TableError, read_passes, write_passes};
+pub use table::{FAULTS, Readable, TableError, read_passes, read_readable, write_passes};
 
 /// One steady pass: a row of the point table. Forces are means over the steady part of the pass.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]

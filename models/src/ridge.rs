@@ -59,8 +59,8 @@ pub enum RidgeError {
     #[error("{what} is {value}: must be {range}")]
     Input { what: String, value: f64, range: String },
     /// The requested time step is above the stable one.
-    #[error("a time step of {asked_s:e} s is unstable here: at most {stable_s:e} s (or leave it out)")]
-    UnstableStep { asked_s: f64, stable_s: f64 },
+    #[error("a time step of {wanted_s:e} s is unstable here: at most {stable_s:e} s (or leave it out)")]
+    UnstableStep { wanted_s: f64, stable_s: f64 },
     /// The run has run away; its numbers mean nothing.
     #[error("the run diverged: velocities beyond 1e6 m/s or not numbers; use a smaller time step")]
     Diverged,

@@ -94,7 +94,7 @@ fn order_with_the_step() {
         .par_iter()
         .map(|case| {
             let case = RidgeCase { elements: 200, ..*case };
-            // One step for all layers: the longer ones and the added mass are held against it elsewhere.
+            // One step for all layers: the longer ones and the added mass are compared with it elsewhere.
             let plain = RunSettings { one_step: true, added_mass: 0.0, ..RunSettings::default() };
             let (own, _, step) = mu(&case, &plain);
             let with = |part: f64| mu(&case, &RunSettings { step_s: Some(part * step), ..plain }).0;

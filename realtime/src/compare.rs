@@ -1,4 +1,4 @@
-//! Measurement against prediction, pass by pass, and the test that says when the model has left.
+//! Measurement against prediction, pass by pass, and the test that says when the model is rejected.
 //!
 //! What a pass tells is a force, so forces are compared, never ratios of noisy numbers. `mu_0` and the two
 //! stiffnesses are known only within their calibration; every pass of a run shares their error. Left alone
@@ -17,10 +17,10 @@ use models::condition::{Condition, OutOfDomain};
 use models::prediction::{FrictionModel, Validity};
 use models::rig_file::PassNoise;
 pub use sequential::{ALARM_LEVEL, Sequential};
-use sequential::{BETS, CAP};
+use sequential::{CAP, pulls};
 use serde::{Deserialize, Serialize};
 
-/// A pass held against the model.
+/// A pass compared with the model.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
 pub struct PassComparison {
     /// Measured `mu'`, with the `mu_0` known so far; `None` while none is known.
@@ -146,7 +146,8 @@ impl Comparator {
         }
         let vibrating = c.amplitude.metres() > 0.0;
         let unit = if vibrating { coulomb } else { 0.0 };
-        self.power.push(unit, &slope, &gain, variance, (known.is_some() && vibrating).then_some(z));
+        let judged = known.map(|_| pulls(c));
+        self.power.push(unit, &slope, &gain, variance, judged, judged.filter(|_| vibrating).map(|_| z));
         // What lies beyond the cap is no news of the shared parameters: a filter that followed it would take
         // up in one pass what it is there to judge. The first word on mu_0 is taken whole.
         let taken = if known.is_some() { z.clamp(-CAP, CAP) * variance.sqrt() } else { innovation };
@@ -178,7 +179,7 @@ impl Comparator {
             validity: prediction.validity,
             judged: self.power.judged(),
             rms_z: self.power.rms_z(),
-            visible_departure: self.power.visible(BETS),
+            visible_departure: self.power.visible(),
         })
     }
 }

@@ -87,7 +87,7 @@ pub struct Grants {
     pub pace_refused: Option<String>,
     /// Whether deep sleep of the CPUs is held off.
     #[serde(default)]
-    pub cpus_kept_awake: bool,
+    pub cpus_awake: bool,
 }
 
 /// What the loop's thread is to ask of the machine. All of it is optional; each has its price.

@@ -258,7 +258,7 @@ fn slcan() {
             while frames < 2 {
                 let count = line.read(&mut buffer).unwrap();
                 reader.push(&buffer[..count], |said| {
-                    frames += u64::from(matches!(said, instruments::codec::can::SlcanSaid::Frame(_)));
+                    frames += u64::from(matches!(said, instruments::codec::can::SlcanMessage::Frame(_)));
                 });
             }
             1

@@ -14,6 +14,12 @@
 //! | write tags and notes, diagnose a run that is over | the same |
 //! | pause, go on | the same, and a server that was started with `--allow-control` |
 //!
+//! | module | holds |
+//! |---|---|
+//! | `server`, `serve`, `guard` | threads and connections; answers to requests; who may do what |
+//! | `api`, `pages` | the JSON of the pages in `assets/app.js`; what is read from the disk for it |
+//! | `stream`, `foxglove`, `metrics`, `download` | live messages; the same for Foxglove; Prometheus; files of a run |
+//!
 //! The token is new at every start, is part of the address's fragment (which no browser sends), and is
 //! compared in constant time. No request can arm a rig, begin a run or change a limit.
 

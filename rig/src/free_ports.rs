@@ -3,7 +3,7 @@
 
 #![allow(clippy::disallowed_methods, reason = "a socket is waited for in wall-clock time")]
 
-use crate::rig_lock::RigClaim;
+use crate::rig_lock::RigLock;
 use drivers::InstrumentSetup;
 use drivers::modbus_tcp::resolve;
 use instruments::schema::LinkKind;
@@ -40,7 +40,7 @@ pub fn free(setup: &Setup) -> miette::Result<()> {
     }
     if wrong.is_empty()
         && !served
-        && let Err(held) = RigClaim::take(setup)
+        && let Err(held) = RigLock::take(setup)
     {
         let remedy = held.help().map(|h| h.to_string());
         wrong.add(&["name"], format!("{held}: {}", held.root_cause()), remedy);

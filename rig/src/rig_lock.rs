@@ -19,11 +19,11 @@ const FOLDERS: [&str; 3] = ["/run/lock", "/dev/shm", "/tmp"];
 const SHARED: u32 = 0o1777;
 
 /// The locks of a rig's instruments, held as long as this lives: the system frees them with the process, whatever ends it.
-pub struct RigClaim {
+pub struct RigLock {
     _locks: Vec<File>,
 }
 
-impl RigClaim {
+impl RigLock {
     /// Takes all instruments of a setup.
     ///
     /// # Errors
@@ -36,7 +36,7 @@ impl RigClaim {
             take(&folder, identity)
                 .wrap_err_with(|| format!("the instrument at {identity} cannot be claimed"))
         };
-        Ok(RigClaim { _locks: identities.iter().map(take).collect::<miette::Result<_>>()? })
+        Ok(RigLock { _locks: identities.iter().map(take).collect::<miette::Result<_>>()? })
     }
 }
 

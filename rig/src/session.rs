@@ -1,7 +1,7 @@
 //! A sweep in wall-clock time. Four threads, each with one duty: the loop; the record's writer; the sweep, which answers
 //! the loop's rows within a millisecond or two; and this one, which makes passes safe on the disk and hands the news on:
-//! what is printed, published or shown has bounded queues and threads of its own. A slow disk so reaches neither the loop nor the
-//! stage, and a reader that takes nothing does not reach this thread.
+//! what is printed, published or shown has bounded queues and threads of its own. So a slow disk reaches
+//! neither the loop nor the stage, and a reader that takes nothing does not reach this thread.
 #![allow(clippy::disallowed_methods, reason = "a sweep in wall-clock time, beside the loop")]
 
 mod writer;
@@ -9,7 +9,7 @@ mod writer;
 use crate::dead_man_key::DeadManKey;
 use crate::emulators::Embedded;
 use crate::exposure::{Keeping, Ledger};
-use crate::rig_lock::RigClaim;
+use crate::rig_lock::RigLock;
 use crate::wall_loop::{Ended, LoopHandle, Parts, WallLoop};
 use miette::{IntoDiagnostic, WrapErr};
 use realtime::clock::Clock;
@@ -61,7 +61,7 @@ fn over_instruments(
 ) -> miette::Result<Summary> {
     let Begun { dir, mut sequence, planned, answers, .. } = begun;
     let key = if job.setup.hand_at_key() { Some(DeadManKey::open()?) } else { None };
-    let _claim = RigClaim::take(&job.setup)?;
+    let _claim = RigLock::take(&job.setup)?;
     let ledger = Ledger::open(&job.setup, &job.notes)?;
     if let Some(ledger) = &ledger {
         job.setup.config.exposed = ledger.exposed();
@@ -120,8 +120,8 @@ fn over_instruments(
 
     // Whatever ended it: off first.
     let Ended { report, links, off } = rig.end();
-    let said_off = std::panic::catch_unwind(AssertUnwindSafe(|| news(Update::Off(&off))));
-    let panicked = panicked.or(said_off.err());
+    let off_reported = std::panic::catch_unwind(AssertUnwindSafe(|| news(Update::Off(&off))));
+    let panicked = panicked.or(off_reported.err());
     drop(held);
     if let Some(keeping) = keeping {
         keeping.end(off.read_back);

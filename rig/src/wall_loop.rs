@@ -1,4 +1,10 @@
 //! The loop in wall-clock time: a thread of its own, instruments behind links.
+//!
+//! [`WallLoop`] owns the thread and the links; [`LoopHandle`] sends commands and reads rows. States: running
+//! -> stopped (a few cycles carry the stop to the links) -> [`Ended`], with what the links read back of
+//! their 'off'. Dropping a `WallLoop` stops the loop first and then switches the links off, so a panic of
+//! the owner ends the drive. The same commands go to the loop in virtual time (`runs::supervisor`); nothing
+//! above knows which of the two it has.
 #![allow(clippy::disallowed_methods, reason = "the supervisor waits in wall-clock time, beside the loop")]
 
 use drivers::Links;

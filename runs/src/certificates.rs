@@ -34,7 +34,7 @@ pub struct Certificates {
     pub amplitude: Option<AmplitudeCalibration>,
     /// The gain in m per unit of a drive whose set-point is a current.
     pub amplitude_m_per_unit: Option<f64>,
-    /// Ranges of temperature that the amplifier's own channel is held against while the rig runs.
+    /// Ranges of temperature that the amplifier's own channel is compared with while the rig runs.
     pub temperature_ranges: Vec<TemperatureRange>,
     /// What remains uncertain, and which file says so, for rig.toml.
     pub calibration: Calibration,

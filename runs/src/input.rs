@@ -7,6 +7,7 @@ use std::borrow::Cow;
 use std::io::Read;
 use std::ops::Range;
 use std::path::Path;
+use std::sync::Arc;
 use toml::Spanned;
 use toml::de::{DeTable, DeValue};
 
@@ -18,7 +19,7 @@ pub struct BadInput {
     #[help]
     remedy: Option<String>,
     #[source_code]
-    text: NamedSource<String>,
+    text: NamedSource<Arc<String>>,
     #[label("here")]
     place: Option<SourceSpan>,
 }
@@ -32,12 +33,8 @@ impl BadInput {
         problem: impl Into<String>,
         remedy: impl Into<Option<String>>,
     ) -> Self {
-        BadInput {
-            problem: problem.into(),
-            remedy: remedy.into(),
-            text: NamedSource::new(name, text.to_string()),
-            place: place.map(SourceSpan::from),
-        }
+        let text = NamedSource::new(name, Arc::new(text.to_string()));
+        BadInput { problem: problem.into(), remedy: remedy.into(), text, place: place.map(SourceSpan::from) }
     }
 }
 
@@ -67,14 +64,23 @@ impl<'a> Problems<'a> {
         self.add_at(place_of(self.text, path), problem, remedy);
     }
 
-    /// One more, at a place.
+    /// One more, at a place; a problem that is there already, at the same place, is no second one.
     pub fn add_at(
         &mut self,
         place: Option<Range<usize>>,
         problem: impl Into<String>,
         remedy: impl Into<Option<String>>,
     ) {
-        self.all.push(BadInput::new(self.name, self.text, place, problem, remedy));
+        let (place, problem) = (place.map(SourceSpan::from), problem.into());
+        if self.all.iter().any(|had| had.place == place && had.problem == problem) {
+            return;
+        }
+        // All of them share one copy of the text.
+        let text = match self.all.first() {
+            Some(had) => had.text.clone(),
+            None => NamedSource::new(self.name, Arc::new(self.text.to_string())),
+        };
+        self.all.push(BadInput { problem, remedy: remedy.into(), text, place });
     }
 
     /// The value, or one problem more.
@@ -256,7 +262,22 @@ pub fn in_si(text: &str) -> Cow<'_, str> {
 /// # Errors
 /// What TOML or the schema says, with the place. Unknown keys are errors wherever the schema says so.
 pub fn parse_toml<T: DeserializeOwned>(name: &str, text: &str) -> Result<T, BadInput> {
-    toml::from_str(&in_si(text)).map_err(|e| BadInput::new(name, text, e.span(), in_words(e.message()), None))
+    toml::from_str(&in_si(text)).map_err(|e| {
+        let remedy = DeTable::parse(text).is_err().then(|| of_syntax(text, e.span()));
+        BadInput::new(name, text, e.span(), in_words(e.message()), remedy)
+    })
+}
+
+/// What helps where a text is no TOML.
+fn of_syntax(text: &str, place: Option<Range<usize>>) -> String {
+    let at = place.map_or(0, |place| place.start);
+    let line = text.get(..at).map_or(0, |before| before.matches('\n').count());
+    let value = text.lines().nth(line).and_then(|line| line.split('#').next()?.split_once('='));
+    let number = value.and_then(|(_, value)| crate::quantity::with_point(value));
+    number.filter(|number| number.parse::<f64>().is_ok()).map_or_else(
+        || "a line of TOML is `key = value`, [table] or [[list]]; texts have quotation marks".into(),
+        |number| format!("a number has a decimal point: {number}"),
+    )
 }
 
 /// Reads a rig.toml.
@@ -323,7 +344,7 @@ pub fn place_of(text: &str, path: &[&str]) -> Option<Range<usize>> {
 
 #[cfg(test)]
 mod tests {
-    use super::{in_si, unit_meant};
+    use super::{Problems, in_si, parse_toml, unit_meant};
 
     #[test]
     fn quantities_with_units_are_their_si_numbers_in_the_same_place() {
@@ -336,6 +357,28 @@ mod tests {
             assert!(si.contains(part), "{si}");
         }
         assert_eq!(in_si("no = toml = text"), "no = toml = text");
+    }
+
+    #[test]
+    fn what_is_no_toml_has_a_remedy_and_a_decimal_comma_its_own() {
+        for (text, help) in [
+            ("[base]\nfrequency_hz = 27,5 # kHz\n", "a number has a decimal point: 27.5"),
+            ("[base\nfrequency_hz = 27\n", "`key = value`"),
+            ("a = [1, 2\nb = 3\n", "`key = value`"),
+        ] {
+            let why = parse_toml::<toml::Table>("plan.toml", text).unwrap_err();
+            let help_text = miette::Diagnostic::help(&why).map(|help| help.to_string()).unwrap_or_default();
+            assert!(help_text.contains(help), "{text}: {help_text}");
+        }
+    }
+
+    #[test]
+    fn one_problem_at_one_place_is_one() {
+        let mut wrong = Problems::of("plan.toml", "[base]\nnormal_force_n = -1\n");
+        for problem in ["too small", "too small", "no number"] {
+            wrong.add(&["base", "normal_force_n"], problem, None);
+        }
+        assert!(wrong.end().unwrap_err().to_string().starts_with("2 problems: too small; no number"));
     }
 
     #[test]

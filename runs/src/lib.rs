@@ -1,7 +1,8 @@
 //! A friction sweep without an instrument: what people write, the order of the passes, virtual time, the run's folder, the report.
 //!
-//! Nothing here needs a socket or a wall clock. The crate `rig` runs the same sweep over instruments. Downstream:
-//! `input` -> `setup`, `plan` -> `certificates` -> `sequence`, `supervisor` -> `session` -> `run_dir` -> `report`.
+//! No instrument and no loop in wall-clock time is here: the crate `rig` runs the same sweep over
+//! instruments. Downstream: `input` -> `setup`, `plan` -> `certificates` -> `sequence`, `supervisor` ->
+//! `session` -> `run_dir` -> `report`.
 //!
 //! | module | purpose |
 //! |---|---|

@@ -1,4 +1,15 @@
 //! A plan: which passes to make, in which order, and how each is made.
+//!
+//! ```text
+//! PlanFile (as written) -> Plan (checked, with its text for places) -> points (limits, resolution, seed) ->
+//! Point
+//! ```
+//!
+//! A series is the product of its lists; what it leaves out is the base's. Its conditions are repeated and
+//! shuffled within each state of the air, with passes without vibration between them. `points` makes the
+//! passes, `reach` checks what the instruments can do, `visible` what the sensors can see, `render` a wanted
+//! friction, `follow` how a force is held. Every point is checked before anything moves. `PassTimes` are the
+//! only times of a pass that a plan sets.
 
 mod bundled;
 mod follow;

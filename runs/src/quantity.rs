@@ -18,6 +18,11 @@ fn power(written: &str, unit: &str) -> Option<i32> {
     }
 }
 
+/// The text with a point, where it has one decimal comma.
+pub(crate) fn with_point(text: &str) -> Option<String> {
+    (text.matches(',').count() == 1 && !text.contains('.')).then(|| text.trim().replace(',', "."))
+}
+
 /// The value in SI of a text with or without a unit. `unit` is the SI unit.
 ///
 /// # Errors
@@ -41,6 +46,9 @@ pub fn parse(text: &str, unit: &str) -> Result<f64, String> {
         }
     };
     text.char_indices().skip(1).find_map(|(at, _)| split(at)).ok_or_else(|| {
+        if let Some(pointed) = with_point(text).filter(|pointed| parse(pointed, unit).is_ok()) {
+            return format!("a number has a decimal point: {pointed}");
+        }
         let examples = match unit {
             "m" => "2um, 0.5mm or 2e-6",
             "Hz" => "27.5kHz or 27500",
@@ -84,5 +92,7 @@ mod tests {
             let why = parse(text, unit).unwrap_err();
             assert!(why.contains("write "), "{text}: {why}");
         }
+        assert_eq!(parse("0,9 N", "N"), Err("a number has a decimal point: 0.9 N".into()));
+        assert!(parse("1,000,5 N", "N").unwrap_err().contains("write "));
     }
 }

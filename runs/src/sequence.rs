@@ -215,7 +215,7 @@ impl Sequence {
         Sequence { session: Some(session), start_s, ..self }
     }
 
-    /// The same, with certificates that are held against the amplifier's temperature at the start of each
+    /// The same, with certificates that are compared with the amplifier's temperature at the start of each
     /// pass.
     pub fn watching(self, temperature_ranges: &[TemperatureRange]) -> Self {
         Sequence { temperature_ranges: temperature_ranges.to_vec(), ..self }
@@ -426,7 +426,7 @@ impl Sequence {
         c.amplitude > PeakToPeak::ZERO && self.model.target().is_some()
     }
 
-    /// Length of the stroke of a pass in m, half of it either side of its position.
+    /// Half the stroke of a pass, m: it slides this far on either side of its position.
     fn half_stroke_m(&self, point: &Point) -> f64 {
         0.5 * (point.condition.speed_m_s
             * self.times.sliding_s(point.edges, point.condition.speed_m_s)[0]
@@ -494,7 +494,7 @@ impl Sequence {
         let Ok(stage) = row.inputs.seen.stage else { return };
         let start = c.position_m - c.direction.sign() * self.half_stroke_m(&point);
         let away = start - stage.position_m;
-        // Close enough, or already past the start in the sense of the pass but not by more than a millimetre.
+        // Close enough: within 0.2 mm of the start, on either side.
         if away.abs() < 2e-4 {
             out.commands.push(self.slide(c, Phase::Settle));
             self.stage = Stage::Settle { since: row.now };

@@ -125,7 +125,7 @@ pub struct Summary {
     /// Whether the measurement disagrees with the model.
     pub model_departed: bool,
     /// What the comparison of all passes says.
-    #[serde(default = "nothing_said")]
+    #[serde(default = "no_claim")]
     pub agreement: Agreement,
     /// `Psi*` of Eq. 20 for the peak-to-peak amplitude; none where the passes give none.
     #[serde(default, skip_serializing_if = "Option::is_none")]
@@ -163,7 +163,7 @@ pub struct Summary {
 }
 
 /// The finding of a summary that was written before it had one.
-fn nothing_said() -> Agreement {
+fn no_claim() -> Agreement {
     Agreement::of(None, false)
 }
 

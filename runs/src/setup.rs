@@ -1,4 +1,8 @@
 //! A setup: which instruments make up the rig, its limits, its fingertip, its noise.
+//!
+//! `SetupFile` is what is written, `Setup` what was checked: profiles found (`profiles`), limits below the
+//! hard limits (`limits`), and the guards that the fingertip needs (`guards`). A setup has either addresses
+//! of instruments or a virtual rig. Only the clock of the latter may be held while the computer is stalled.
 
 mod bundled;
 mod guards;
@@ -286,7 +290,8 @@ impl Setup {
                 wrong.add(&[c.name], format!("{} = {value}: {} is needed", c.name, c.needed), remedy);
             }
         }
-        let tip = wrong.keep(&["finger"], Fingertip::resolve(&file.finger, folder));
+        let tip = Fingertip::resolve(&file.finger, folder);
+        let tip = tip.map_err(|problem| wrong.add(&["finger", tip_key(text, &problem)], problem, None)).ok();
         let mut unfit = profiles::resolve(&mut file, folder);
         if unfit.is_empty() {
             unfit = profiles::fit(&file);
@@ -469,4 +474,11 @@ impl Setup {
             calibration: self.certificates.calibration.clone(),
         }
     }
+}
+
+/// The key of `[finger]` that a problem of the fingertip is about.
+fn tip_key(text: &str, problem: &str) -> &'static str {
+    let keys = ["normal_stiffness_n_per_m", "lateral_stiffness_n_per_m", "stiffness_relative_sd", "mu0"];
+    let stated = |key: &str| input::place_of(text, &["finger", key]).is_some();
+    keys.into_iter().find(|key| problem.contains(&format!("{key} =")) && stated(key)).unwrap_or("tip")
 }

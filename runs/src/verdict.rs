@@ -1,4 +1,4 @@
-//! A verdict for people: what a terminal shows, and the plan of the experiment that tells most.
+//! A verdict for people: what a terminal shows, and the plan of the best next experiment.
 
 pub mod edges;
 pub mod files;
@@ -8,6 +8,7 @@ use diagnosis::certificates;
 pub(crate) use diagnosis::describe::plain;
 use diagnosis::describe::probability;
 use diagnosis::intervals::{Estimate, Shape};
+use diagnosis::locate::Region;
 use diagnosis::verdict::{Diagnosis, Hypothesis};
 use miette::IntoDiagnostic;
 use models::condition::Condition;
@@ -17,6 +18,9 @@ use std::path::Path;
 
 /// Parts of the operating space that are named, the largest first.
 const PARTS: usize = 6;
+/// p-value below which a region is listed for people, and the least share of the gap in it.
+const SIGNIFICANT: f64 = 0.05;
+const LEAST_SHARE: f64 = 0.01;
 /// Causes that a hypothesis cannot be separated from, by name; of more the number.
 const ALIASES: usize = 4;
 /// Probability from which a hypothesis is explained: its parameters, and what it cannot be separated from.
@@ -58,8 +62,8 @@ pub fn next_plan(result: &Diagnosis) -> Option<String> {
     result.report.next_experiment.iter().find(|e| !e.conditions.is_empty()).map(plan)
 }
 
-/// The plan of a designed experiment, one series a condition: those that tell most first, grouped by
-/// pressure, since a chamber is changed once.
+/// The plan of a designed experiment, one series with a name a condition: those that tell most first, grouped
+/// by pressure, since a chamber is changed once.
 pub fn plan(experiment: &diagnosis::next::Experiment) -> String {
     let mut conditions = experiment.conditions.clone();
     let pressure = |c: &Condition| c.ambient_pressure_pa.unwrap_or(0.0);
@@ -78,8 +82,9 @@ pub fn plan(experiment: &diagnosis::next::Experiment) -> String {
             .map(|(name, value)| format!("{name} = {value:e}\n"))
             .collect::<String>()
     );
-    for c in &conditions {
-        text.push_str(&format!("\n[[series]]\ndirections = [{}]\n", i8::from(c.direction)));
+    for (c, number) in conditions.iter().zip(1..) {
+        let direction = i8::from(c.direction);
+        text.push_str(&format!("\n[[series]]\nname = \"pass {number}\"\ndirections = [{direction}]\n"));
         for (name, value) in covariate::planned().filter(listed).filter_map(|k| of(c, k)) {
             text.push_str(&format!("{name} = [{value:e}]\n"));
         }
@@ -110,6 +115,31 @@ pub fn aliases(h: &Hypothesis) -> Option<String> {
     Some(plain(&others[..others.len().min(ALIASES)].join(", ")) + &more)
 }
 
+/// What an unknown departure looks like, a line a structure; none of structures that the best cause beats.
+pub fn looks_like(result: &Diagnosis) -> impl Iterator<Item = String> + '_ {
+    let all = result.report.description.iter().filter(|d| d.leads());
+    all.map(|d| format!("{} ({} against no gap)", d.text, odds_base10(d.log10_odds_vs_no_gap)))
+}
+
+/// Regions with passes in which the gap shows, the largest first and no more than `most`; and a line that
+/// counts the others.
+pub fn listed(regions: &[Region], most: usize) -> (Vec<&str>, Option<String>) {
+    let shows = |g: &&Region| g.measured && g.p_value < SIGNIFICANT && g.share_of_gap >= LEAST_SHARE;
+    let shown: Vec<&str> = regions.iter().filter(shows).take(most).map(|g| &*g.text).collect();
+    let empty = regions.iter().filter(|g| !g.measured).count();
+    let weak = regions.iter().filter(|g| g.measured && g.p_value >= SIGNIFICANT).count();
+    let small = regions.len() - shown.len() - empty - weak;
+    let counts = [
+        (small, "with a smaller share".to_string()),
+        (empty, "without passes".to_string()),
+        (weak, format!("with p of {SIGNIFICANT} or more")),
+    ];
+    let rest: Vec<String> =
+        counts.iter().filter(|(n, _)| *n > 0).map(|(n, words)| format!("{n} {words}")).collect();
+    let rest = (!rest.is_empty()).then(|| format!("Further regions: {}", rest.join(", ")));
+    (shown, rest)
+}
+
 /// What a terminal shows.
 pub fn terminal(result: &Diagnosis) -> String {
     let r = &result.report;
@@ -127,11 +157,9 @@ pub fn terminal(result: &Diagnosis) -> String {
             }
         }
     }
-    if !r.description.is_empty() {
-        text.push_str("\nWhat the departure looks like\n");
-    }
-    for d in &r.description {
-        text.push_str(&format!("  {} ({} against no gap)\n", d.text, odds_base10(d.log10_odds_vs_no_gap)));
+    for (at, line) in looks_like(result).enumerate() {
+        text.push_str(if at == 0 { "\nWhat the departure looks like\n  " } else { "  " });
+        text.push_str(&format!("{line}\n"));
     }
     if !r.at_least.is_empty() {
         text.push_str(&format!("\nAt least {}; the rest is open\n", plain(&r.at_least.join(", "))));
@@ -160,13 +188,10 @@ pub fn terminal(result: &Diagnosis) -> String {
     }
     if !r.location.regions.is_empty() {
         text.push_str("\nWhere\n");
-        let shown = r.location.regions.iter().filter(|g| g.share_of_gap >= 0.01).count().min(PARTS);
-        for region in r.location.regions.iter().take(shown) {
-            text.push_str(&format!("  {}\n", region.text));
-        }
-        let rest = r.location.regions.len() - shown;
-        if rest > 0 {
-            text.push_str(&format!("  and {rest} more in the JSON document (--json)\n"));
+        let (shown, rest) = listed(&r.location.regions, PARTS);
+        shown.iter().for_each(|line| text.push_str(&format!("  {line}\n")));
+        if let Some(rest) = rest {
+            text.push_str(&format!("  {rest} (--json lists them)\n"));
         }
     }
     if !r.next_experiment.is_empty() {

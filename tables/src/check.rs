@@ -1,5 +1,6 @@
 //! What is wrong with whatever people write and the program wrote, with the place; and whether a plan can run on a setup.
 
+mod cells;
 mod place;
 mod shape;
 mod written;
@@ -20,6 +21,7 @@ use std::sync::Arc;
 
 pub use place::{Problem, problems_of};
 
+use place::remedy;
 pub use place::with_place_and_help;
 
 /// What the plans are judged on.
@@ -119,25 +121,41 @@ fn schema_of(kind: &str) -> Option<Kind> {
 /// All that is wrong with it: each with its place, where the file has one, and a remedy.
 pub fn file(name: &str, on: &On) -> miette::Result<Good> {
     let kind = kind_of(name).map_err(|e| with_place_and_help(e, name, None))?;
-    judge(kind, name, on, None).map_err(|report| {
-        // A reader stops at the first key that it does not take: the schema goes on, and then the values.
-        if let (Some(known), Ok(text)) = (schema_of(kind), text_of(name)) {
-            let mut problems = Problems::of(name, &text);
-            shape::toml(&known.schema(), &text, &mut problems);
-            if !problems.is_empty() && matches!(kind, "setup" | "plan" | "fingertip" | "rig.toml") {
-                let meant = shape::as_meant(&known.schema(), &text);
-                let judged = meant.map(|meant| judge(kind, name, on, Some(meant)));
-                if let Some(Err(values)) = judged {
-                    let values = with_place_and_help(values, name, Some(kind));
-                    place::put_all(&values, &text, &mut problems);
-                }
-            }
-            if let Err(all) = problems.end() {
-                return with_place_and_help(all, name, Some(kind));
+    judge(kind, name, on, None).map_err(|report| in_whole(report, kind, name, on))
+}
+
+/// The refusal of a file that was to be of this kind (as [`kind_of`] says it), with all that is wrong with
+/// the file.
+pub fn refusal(why: miette::Report, name: &str, kind: &'static str) -> miette::Report {
+    let on = On::default();
+    match kind_of(name) {
+        _ if !Path::new(name).exists() => with_place_and_help(why, name, Some(kind)),
+        Ok(other) if other != kind && file(name, &on).is_ok() => {
+            miette::miette!(help = remedy(Some(kind)), "{name} is a {other}; a {kind} is needed here")
+        }
+        _ => in_whole(judge(kind, name, &on, None).err().unwrap_or(why), kind, name, &on),
+    }
+}
+
+/// A refusal with all that is wrong with the file.
+fn in_whole(report: miette::Report, kind: &'static str, name: &str, on: &On) -> miette::Report {
+    // A reader stops at the first key that it does not take: the schema goes on, and then the values.
+    if let (Some(known), Ok(text)) = (schema_of(kind), text_of(name)) {
+        let mut problems = Problems::of(name, &text);
+        shape::toml(&known.schema(), &text, &mut problems);
+        if !problems.is_empty() && matches!(kind, "setup" | "plan" | "fingertip" | "rig.toml") {
+            let meant = shape::as_meant(&known.schema(), &text);
+            let judged = meant.map(|meant| judge(kind, name, on, Some(meant)));
+            if let Some(Err(values)) = judged {
+                let values = with_place_and_help(values, name, Some(kind));
+                place::put_all(&values, &text, &mut problems);
             }
         }
-        with_place_and_help(report, name, Some(kind))
-    })
+        if let Err(all) = problems.end() {
+            return with_place_and_help(all, name, Some(kind));
+        }
+    }
+    with_place_and_help(report, name, Some(kind))
 }
 
 /// Judges a file, or `instead` of what stands in it.

@@ -201,7 +201,7 @@ pub fn read(
     let grid = grid.wrap_err_with(|| shown.to_string())?;
     if grid.rows.is_empty() {
         let notes = grid.notes.join("\n");
-        miette::bail!("{shown}: no rows of numbers\n{notes}");
+        miette::bail!(help = head::NO_ROWS_HELP, "{shown}: no rows of numbers\n{notes}");
     }
     Ok(grid)
 }
@@ -287,27 +287,26 @@ pub fn import(source: &str, bytes: &[u8], grid: &Grid, wanted: &Wanted<'_>) -> m
     let padded = grid.rows.len() - full;
     let room_from = if wanted.padding { full } else { grid.rows.len() };
     let (mut values, mut dropped) = rows(grid, &maps, &clocks, room_from);
+    let is_row = |d: &&Dropped| d.reason != PADDING && d.reason != head::ONE_TEXT;
+    let mut of = (values.len() + dropped.iter().filter(is_row).count(), "rows");
     let mut series = None;
     let mut spreads = Vec::new();
     if let Some(cut) = wanted.series {
+        if 2 * values.len() < of.0 {
+            return Err(mostly_dropped(source, grid, wanted, &dropped, (values.len(), of), padded));
+        }
         let twice = series::last_twice(&mut values);
         dropped.extend(twice);
         let (passes, of_each, counts) =
             series::cut(&values, &cut).map_err(|e| miette::miette!("{source}: {e}"))?;
         (values, spreads) = (passes, of_each);
+        of = (values.len(), "steady stretches");
         series = Some(SeriesLog { cut, counts });
-    }
-    let states_frequency = map.has(Id::Frequency);
-    if !states_frequency && values.iter().any(|v| v.amplitude().is_some_and(|a| a > 0.0)) {
-        miette::bail!(
-            help = "HEADER=frequency:kHz in --map, or --set frequency_hz=27500",
-            "frequency_hz is missing, and the plate vibrates"
-        );
     }
     let (passes, taken) = passes(&values, &spreads, &mut dropped);
     dropped.sort_by_key(|d| d.row);
-    if 2 * passes.len() < values.len().max(1) || passes.is_empty() {
-        return Err(mostly_dropped(source, grid, &dropped, passes.len(), padded));
+    if 2 * passes.len() < of.0 || passes.is_empty() {
+        return Err(mostly_dropped(source, grid, wanted, &dropped, (passes.len(), of), padded));
     }
     if series.is_none() {
         let back = clock::order(&taken, wanted.unsorted).map_err(|e| {
@@ -321,7 +320,7 @@ pub fn import(source: &str, bytes: &[u8], grid: &Grid, wanted: &Wanted<'_>) -> m
         notes.extend(back);
     }
     let columns = write::columns(map, series.is_some());
-    let table = written(&passes, &columns, states_frequency)?;
+    let table = written(&passes, &columns, map.has(Id::Frequency))?;
     let (rig, assumed) = match &wanted.rig {
         Some(text) => (text.clone(), Vec::new()),
         None => write::rig(&passes, source, wanted.tip)?,
@@ -350,7 +349,7 @@ pub fn import(source: &str, bytes: &[u8], grid: &Grid, wanted: &Wanted<'_>) -> m
         passes: passes.len(),
         series,
         ranges: remarks::ranges(&passes, &columns),
-        remarks: remarks::remarks(&passes, &columns),
+        remarks: [map::contradicted(map, grid), remarks::remarks(&passes, &columns)].concat(),
         dropped,
     };
     Ok(Imported { table, rig, log })
@@ -358,9 +357,10 @@ pub fn import(source: &str, bytes: &[u8], grid: &Grid, wanted: &Wanted<'_>) -> m
 
 /// Refuses a map that lacks columns, all at once.
 fn refuse_lacks(source: &str, grid: &Grid, wanted: &Wanted<'_>, not_taken: &[String]) -> miette::Result<()> {
-    let lacks = wanted.map.lacks(wanted.series.is_some());
+    let (twice, lacks) = (wanted.map.twice(), wanted.map.lacks(grid, wanted.series.is_some()));
+    let all = [&twice[..], &lacks[..]].concat().join("\n");
     if lacks.is_empty() {
-        return Ok(());
+        return if twice.is_empty() { Ok(()) } else { Err(miette::miette!(help = map::ONCE, "{all}")) };
     }
     let left = if not_taken.is_empty() {
         String::new()
@@ -368,7 +368,8 @@ fn refuse_lacks(source: &str, grid: &Grid, wanted: &Wanted<'_>, not_taken: &[Str
         format!("\ncolumns of {source} that are not taken: {}", not_taken.join(", "))
     };
     let across = across(grid).unwrap_or_default();
-    miette::bail!(help = format!("state it with --map and --set{left}{across}"), "{}", lacks.join("\n"));
+    let once = if twice.is_empty() { String::new() } else { format!("\n{}", map::ONCE) };
+    miette::bail!(help = format!("state what is missing with --map and --set{once}{left}{across}"), "{all}");
 }
 
 /// The map of each block of the source; none of a block that is another table.
@@ -385,6 +386,9 @@ fn maps(source: &str, grid: &Grid, map: &Map, notes: &mut Vec<String>) -> miette
     }
     Ok(maps)
 }
+
+/// Why a row of padding is left out.
+const PADDING: &str = "zeros at the end: room that was not filled";
 
 /// The values of the rows, and the rows that are left out. Those from number `room_from` on are padding.
 fn rows(
@@ -404,8 +408,7 @@ fn rows(
     for (number, row) in grid.rows.iter().enumerate() {
         let Some(map) = &maps[row.block] else { continue };
         if number >= room_from {
-            let reason = "zeros at the end: room that was not filled".to_string();
-            dropped.push(Dropped { row: row.place, column: String::new(), text: "0".into(), reason });
+            dropped.push(left_out(&(row.place, "0".into(), PADDING.into())));
             continue;
         }
         match Values::read(grid, map, row, number, clocks.get(number).copied().flatten()) {
@@ -480,11 +483,11 @@ fn across(grid: &Grid) -> Option<String> {
 fn mostly_dropped(
     source: &str,
     grid: &Grid,
+    wanted: &Wanted<'_>,
     dropped: &[Dropped],
-    passes: usize,
+    (taken, (all, what)): (usize, (usize, &str)),
     padded: usize,
 ) -> miette::Report {
-    let rows = grid.rows.len();
     let mut reasons: Vec<(String, usize, &Dropped)> = Vec::new();
     for d in dropped {
         let what = format!("{}: {}", d.column, d.reason);
@@ -494,27 +497,41 @@ fn mostly_dropped(
         }
     }
     reasons.sort_by_key(|(_, n, _)| std::cmp::Reverse(*n));
-    let list: Vec<String> = reasons
+    let mut list: Vec<String> = reasons
         .iter()
         .take(4)
         .map(|(what, n, first)| format!("{n} rows: {what} (first in row {}: '{}')", first.row, first.text))
         .collect();
+    list.extend(map::contradicted(&wanted.map, grid));
+    let help = remedy(grid, dropped, reasons.first().map(|(.., first)| *first), padded);
+    miette::miette!(help = help, "{source}: {taken} of {all} {what} can be taken\n{}", list.join("\n"))
+}
+
+/// What cures most of the rows that are left out; `worst` is the first of the most frequent kind.
+fn remedy(grid: &Grid, dropped: &[Dropped], worst: Option<&Dropped>, padded: usize) -> String {
     let negative = dropped.iter().filter(|d| d.column == "normal_force_n" && d.text.starts_with('-')).count();
-    let help = if 2 * negative > dropped.len() {
+    let (text, reason) = worst.map_or(("", ""), |d| (&d.text, &d.reason));
+    if 2 * negative > dropped.len() {
         "compression is positive: turn the column with a minus before its unit, as in normal_force:-N"
             .to_string()
     } else if 2 * padded > dropped.len() {
         format!("the last {padded} rows are zeros in every column: --accept padding leaves them out")
+    } else if reason == values::NO_NUMBER && text.chars().all(|c| "+-0123456789., '\u{a0}".contains(c)) {
+        "export the table without thousands separators and with one decimal mark; --decimal states the mark"
+            .to_string()
+    } else if reason == values::NO_NUMBER {
+        format!("'{text}' is no number: correct these cells at the source, or map another column")
+    } else if reason == values::NO_TIME {
+        "export the times as seconds, 12:34:56.7, 2024-03-01 12:34:56 or 01.03.2024 12:34:56".to_string()
     } else if grid.format.starts_with("text") {
         "check the map and its units; --decimal and --delimiter say how text is read".to_string()
     } else {
         "check the map and its units".to_string()
-    };
-    miette::miette!(help = help, "{source}: {passes} passes of {rows} rows can be taken\n{}", list.join("\n"))
+    }
 }
 
-/// The map that the headers suggest, as text for people and whether anything was assumed.
-pub fn guessed_lines(map: &Map) -> Vec<String> {
+/// The columns that the headers suggest, as text for people and whether anything was assumed.
+pub fn guessed_lines(guessed: &[map::Taken]) -> Vec<String> {
     let line = |c: &map::Taken| {
         let target = &TARGETS[c.target];
         let assumed = if c.assumed { " (no unit stated: SI assumed)" } else { "" };
@@ -530,5 +547,5 @@ pub fn guessed_lines(map: &Map) -> Vec<String> {
         };
         format!("  {} -> {}{unit}: {}{assumed}{peak}", c.header, target.name, target.words)
     };
-    map.columns.iter().map(line).collect()
+    guessed.iter().map(line).collect()
 }

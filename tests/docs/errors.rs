@@ -226,15 +226,12 @@ pub fn page() -> (String, Vec<String>) {
         let (out, _) = texts(&given(folder.path(), typed, true));
         let document =
             out.lines().next().and_then(|line| serde_json::from_str(line).ok()).unwrap_or_default();
-        let mut told = sentences(&document);
-        // What the reader of arguments says has more lines than its document.
-        if told.iter().all(|sentence| sentence.starts_with("error:")) {
-            let lines =
-                err.lines().take_while(|line| !line.starts_with("Usage:") && !line.starts_with("For more"));
-            told = vec![lines.collect::<Vec<_>>().join(" ")];
-        }
-        let told =
-            told.join(". ").replace('\n', " ").replace('|', "\\|").replace('<', "&lt;").replace(".. ", ". ");
+        let told = sentences(&document)
+            .join(". ")
+            .replace('\n', " ")
+            .replace('|', "\\|")
+            .replace('<', "&lt;")
+            .replace(".. ", ". ");
         page.push_str(&format!(
             "| `{typed}` | {} |\n",
             told.split_whitespace().collect::<Vec<_>>().join(" ")

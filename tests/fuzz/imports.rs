@@ -12,7 +12,7 @@ pub const ALL: &[(&str, fn(&[u8], &mut Chance))] = &[("texts", texts), ("binarie
 fn imported(name: &str, input: &[u8]) {
     let Ok(grid) = read(Path::new(name), input, None, Marks::default(), &[]) else { return };
     assert!(grid.rows.iter().all(|row| row.block <= grid.blocks.len()));
-    let mut map = Map { columns: guess(&grid), ..Map::default() };
+    let mut map = Map { columns: guess(&grid, &Map::default()), ..Map::default() };
     map.set(&["amplitude_pp_m=0,direction=1".into()]).unwrap();
     let wanted = Wanted { map, ..Wanted::default() };
     if let Ok(done) = import(name, input, &grid, &wanted) {

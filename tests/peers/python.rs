@@ -94,7 +94,7 @@ fn the_package_says_what_the_command_says() {
     let (out, err) = texts(&foreign);
     assert!(foreign.status.success() && out.contains("4 passed"), "{out}{err}");
 
-    // The notebooks, with a real kernel; their outputs are held against those that are kept.
+    // The notebooks, with a real kernel; their outputs are compared with the stored ones.
     let notebooks = python()
         .arg(file("tests/python/notebooks.py"))
         .arg(file("python/notebooks"))

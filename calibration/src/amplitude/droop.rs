@@ -1,4 +1,4 @@
-//! Amplitude under load: `w = w_free / (1 + d F^p)` (physics.md 4.12).
+//! Amplitude under load: `w = w_free / (1 + d F^p)`.
 
 use super::{AmplitudeError, AmplitudePoint, check, lack_of_fit, relative_scatter};
 use crate::regression::Fit;

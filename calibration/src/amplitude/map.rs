@@ -1,7 +1,7 @@
 //! Amplitude over position: the nodal pattern of the plate.
 //!
 //! `w = w0 (1 - d + d |cos(2 pi (x - x0) / lambda)|)`: a standing wave with share `d`, on top of what travels
-//! and leaves no node. `d = 1` is the pattern of physics.md 4.14.
+//! and leaves no node. `d = 1` is that of a pure standing wave.
 
 use super::{AmplitudeError, AmplitudePoint, check, relative_scatter};
 use crate::regression::nonlinear::{Scatter, fit};
@@ -90,7 +90,7 @@ mod tests {
 
     #[test]
     fn half_waves_of_14_mm_on_a_40_mm_stroke() {
-        // physics.md 4.14: glass of 2 mm at 25 kHz has a half-wave of 14 mm.
+        // Glass of 2 mm at 25 kHz has a half-wave of 14 mm.
         let points: Vec<AmplitudePoint> = (0..41)
             .map(|i| {
                 let x = f64::from(i) * 1e-3 - 0.02;

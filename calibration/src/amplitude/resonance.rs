@@ -17,7 +17,7 @@ pub struct Resonance {
 
 /// Fits a sweep: `at` is the frequency in Hz.
 ///
-/// The curve is the Lorentzian of physics.md 4.13 with a tilt,
+/// The curve is a Lorentzian with a tilt,
 /// `w0 (1 + a (f - f0) / f0) / sqrt(1 + (2 Q (f - f0) / f0)^2)`. Without the tilt the answer would depend on
 /// whether displacement, velocity or current is driven and measured (by about a hertz at Q 100): fitted, it
 /// costs a somewhat wider interval and leaves no such bias.

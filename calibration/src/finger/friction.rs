@@ -1,7 +1,7 @@
 //! Friction without vibration: mu0 with its dependence on load, speed and time since contact.
 //!
 //! `ln mu0 = ln m + (n - 1) ln(F/F0) + s ln(U/U0) + ln(1 + g (1 - exp(-t/tau)))`: the load exponent of a
-//! non-Coulombic contact (physics.md 4.5), rate dependence (4.7), and occlusion or ageing with time (4.8).
+//! non-Coulombic contact , rate dependence, and occlusion or ageing with time.
 
 use super::FingerError;
 use crate::regression::Fit;

@@ -196,7 +196,7 @@ mod tests {
 
     #[test]
     fn a_mount_that_rings_at_55_hz_is_found() {
-        // physics.md, section 6: a leaf stage with a 55 Hz lateral mode.
+        // A leaf stage with a 55 Hz lateral mode.
         let time: Vec<f64> = (0..1000).map(|i| f64::from(i) * 1e-3).collect();
         let x: Vec<f64> = time
             .iter()

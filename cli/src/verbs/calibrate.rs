@@ -4,7 +4,7 @@ use super::prelude::*;
 use calibration::certificate::Certificate;
 use rig::bench::AtTheBench;
 use runs::calibrate::{Issued, What, certified, verify};
-use runs::report::human::{number, to_its_uncertainty};
+use runs::report::human::{number, with_uncertainty};
 
 #[derive(Debug, clap::Args)]
 pub struct Args {
@@ -66,6 +66,9 @@ fn priors(args: &PriorsArgs, json: bool) -> miette::Result<ExitCode> {
         calibration::prior::take(&mut priors, verified)
             .map_err(|refusal| miette::miette!("{name}: {refusal}"))?;
     }
+    if priors == Default::default() {
+        say!("none of these certificates bounds an error of the rig: [calibration] stays empty");
+    }
     if json {
         answer_json(&json!({ "calibration": priors }));
     } else {
@@ -77,9 +80,8 @@ fn priors(args: &PriorsArgs, json: bool) -> miette::Result<ExitCode> {
 fn show(certificate: &Certificate, out: &Path) {
     out!("{} certificate for {}: {}", certificate.kind, certificate.instrument.serial, out.display());
     for p in &certificate.parameters {
-        let sd = p.standard_uncertainty;
-        let [value, sd, low, high] = [p.value, sd, p.ci95[0], p.ci95[1]].map(|x| to_its_uncertainty(x, sd));
-        out!("  {:<34} {value} +- {sd} {} (95 %: {low} to {high})", p.name.replace('_', " "), p.unit);
+        let value = with_uncertainty(p.value, p.standard_uncertainty, p.ci95, &p.unit);
+        out!("  {:<34} {value}", p.name.replace('_', " "));
     }
     let r = &certificate.residuals;
     let [sd, largest] = [r.sd, r.largest].map(number);

@@ -27,10 +27,7 @@ pub struct Args {
 /// # Errors
 /// A setup or a model that was named and cannot be used; what is wrong with the files is the answer.
 pub fn run(args: Args, json: bool) -> miette::Result<ExitCode> {
-    let helped = |name: &str| {
-        Setup::load(name).map_err(|why| tables::check::with_place_and_help(why, name, Some("setup")))
-    };
-    let named = args.setup.as_deref().map(helped).transpose()?;
+    let named = args.setup.as_deref().map(super::setup).transpose()?;
     let among = args.files.iter().filter(|f| kind_of(f).is_ok_and(|k| k == "setup"));
     let setup = match (named, among.collect::<Vec<_>>().as_slice()) {
         (Some(setup), _) => Some(setup),

@@ -10,9 +10,14 @@ pub struct Args {
 }
 
 /// Prints the script.
-pub fn run(args: &Args, command: &mut clap::Command) -> miette::Result<ExitCode> {
+pub fn run(args: &Args, command: &mut clap::Command, json: bool) -> miette::Result<ExitCode> {
     let mut script = Vec::new();
     clap_complete::generate(args.shell, command, "muprime", &mut script);
-    out!("{}", String::from_utf8_lossy(&script).trim_end());
+    let text = String::from_utf8_lossy(&script);
+    if json {
+        answer_json(&json!({ "shell": args.shell.to_string(), "text": text }));
+    } else {
+        out!("{}", text.trim_end());
+    }
     exit(DONE)
 }

@@ -16,6 +16,7 @@ use serde_json::json;
 use std::path::{Path, PathBuf};
 use std::process::ExitCode;
 use std::sync::{Arc, Mutex, PoisonError};
+use tables::check::refusal;
 use tables::passes::parse_passes;
 use tables::verdict::{self, Subject};
 
@@ -120,24 +121,33 @@ pub fn run(args: Args, json: bool) -> miette::Result<ExitCode> {
 /// The table on its base law, with the rig's calibration; and what is damaged in a run's folder.
 fn read(inputs: &Inputs<'_>, model: Option<&Path>) -> miette::Result<(Subject, Vec<String>)> {
     let Inputs { table, rig, run } = inputs;
-    let rig = runs::input::rig_file(rig).wrap_err_with(|| {
-        format!("{}: noise and stiffnesses of the rig (--rig names the file)", rig.display())
-    })?;
+    let named = rig.display().to_string();
+    let rig = runs::input::rig_file(rig)
+        .map_err(|why| refusal(why, &named, "rig.toml"))
+        .wrap_err_with(|| format!("{named}: noise and stiffnesses of the rig (--rig names the file)"))?;
     let damage = run.map_or(Ok(Vec::new()), runs::run_dir::damage_in)?;
     let bytes = bytes_of(table, MAX_TABLE_BYTES)
         .wrap_err_with(|| format!("cannot read the table {}", table.display()))?;
-    let passes = parse_passes(table, &bytes)?;
+    let passes = parse_passes(table, &bytes).map_err(|why| refused(why, table))?;
     let shown = || table.display().to_string();
     let rendered = run.is_some_and(|run| run.join(runs::fidelity::FILE).is_file());
     let whole = Subject::of(passes, &bytes, rig).map_err(|why| {
         let help = "passes that render have no steady friction: diagnose a sweep of the same rig, and give its \
                     corrected model to the rendering";
-        if rendered { miette::miette!(help = help, "{why}") } else { miette::Report::msg(why) }
-    });
-    let whole = whole.wrap_err_with(shown)?;
+        match rendered {
+            true => miette::miette!(help = help, "{why}").wrap_err(shown()),
+            false => refused(miette::Report::msg(why), table),
+        }
+    })?;
     let Some(what) = model else { return Ok((whole, damage)) };
     let base = tables::law::for_finger(what, &whole.rig.finger)?;
     Ok((whole.on(base).into_diagnostic().wrap_err_with(shown)?, damage))
+}
+
+/// A table that cannot be diagnosed, with all that is wrong with it.
+fn refused(why: miette::Report, table: &Path) -> miette::Report {
+    let shown = table.display().to_string();
+    refusal(why, &shown, "table").wrap_err(shown)
 }
 
 /// What is tried, as the arguments say.
@@ -155,8 +165,9 @@ fn options(args: &Args) -> miette::Result<Options> {
 fn conditions(path: &Path, subject: &Subject) -> miette::Result<Table> {
     let bytes =
         bytes_of(path, MAX_TABLE_BYTES).wrap_err_with(|| format!("cannot read {}", path.display()))?;
-    let (rows, origin) = (parse_passes(path, &bytes)?, subject.table.origin(&subject.passes));
-    Table::conditions(&rows, &origin).into_diagnostic().wrap_err_with(|| path.display().to_string())
+    let rows = parse_passes(path, &bytes).map_err(|why| refused(why, path))?;
+    let origin = subject.table.origin(&subject.passes);
+    Table::conditions(&rows, &origin).map_err(|why| refused(miette::Report::msg(why), path))
 }
 
 /// Writes the corrected model and the next plan where they are requested and the verdict has them.

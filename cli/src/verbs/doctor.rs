@@ -63,10 +63,10 @@ pub fn run(args: Args, json: bool) -> miette::Result<ExitCode> {
     if let Some(What::Peek(args)) = &args.what {
         return peek::run(args, json);
     }
-    let setup = args.setup.as_deref().map(Setup::load).transpose()?;
+    let setup = args.setup.as_deref().map(super::setup).transpose()?;
     let (findings, lateness_us) =
         if args.instruments_only { (Vec::new(), None) } else { judge(args.seconds) };
-    let plan = args.plan.as_deref().map(Plan::load).transpose()?;
+    let plan = args.plan.as_deref().map(super::plan).transpose()?;
     let instruments = setup.as_ref().map(|setup| talk(setup, plan.as_ref())).transpose()?.unwrap_or_default();
     let good = findings.iter().chain(&instruments).all(|f| f.good);
     let judgement = Judgement { findings, lateness_us, instruments };
@@ -217,7 +217,7 @@ fn talk(setup: &Setup, plan: Option<&Plan>) -> miette::Result<Vec<Finding>> {
         _served = serve(setup, &mut instruments)?;
     } else {
         // Every driver ends with an 'off': that must not reach a rig that another program drives.
-        _claim = match rig::rig_lock::RigClaim::take(setup) {
+        _claim = match rig::rig_lock::RigLock::take(setup) {
             Ok(claim) => claim,
             Err(why) => {
                 let found = format!("{why}: {}", why.root_cause());

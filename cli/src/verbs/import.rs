@@ -84,6 +84,10 @@ pub fn run(args: Args, json: bool) -> miette::Result<ExitCode> {
             );
         }
     }
+    if args.out.exists() && !args.out.is_dir() {
+        let help = "name a folder, as in -o imported";
+        miette::bail!(help = help, "{} is a file, and the import writes into a folder", args.out.display());
+    }
     for (flag, value) in [("--settle-s", args.settle_s), ("--window-s", args.window_s)] {
         if value.is_some_and(|v| !(v.is_finite() && v >= 0.0)) || flag == "--window-s" && value == Some(0.0) {
             miette::bail!("{flag}: a number of seconds above zero is needed");
@@ -165,7 +169,7 @@ pub fn run(args: Args, json: bool) -> miette::Result<ExitCode> {
     exit(DONE)
 }
 
-/// The map that was stated, or the guessed one once it is confirmed.
+/// The map that was stated; what it leaves open is guessed, once that is confirmed.
 fn map_of(args: &Args, grid: &Grid) -> miette::Result<Map> {
     let mut map = Map::default();
     let mut wrong = map.set(&args.set).err().unwrap_or_default();
@@ -176,23 +180,19 @@ fn map_of(args: &Args, grid: &Grid) -> miette::Result<Map> {
     if !wrong.is_empty() {
         miette::bail!("{}", wrong.iter().map(ToString::to_string).collect::<Vec<_>>().join("\n"));
     }
-    if !args.map.is_empty() {
+    if !args.map.is_empty() && map.lacks(grid, args.series).is_empty() {
         return Ok(map);
     }
-    map.columns = guess(grid);
-    // What is set is not guessed as well.
-    map.columns.retain(|c| {
-        let column = tables::import::targets::TARGETS[c.target].column;
-        !map.constants.iter().any(|k| tables::import::targets::TARGETS[k.target].column == column)
-    });
-    say!("The map, guessed from the headers:");
-    guessed_lines(&map).iter().for_each(|line| say!("{line}"));
-    if args.yes {
+    let guessed = guess(grid, &map);
+    if !args.map.is_empty() && guessed.is_empty() {
         return Ok(map);
     }
-    let lacks = map.lacks(args.series);
-    if !lacks.is_empty() {
-        // The import itself reports everything that is missing.
+    let what = if args.map.is_empty() { "The map" } else { "What --map leaves open" };
+    say!("{what}, guessed from the headers:");
+    guessed_lines(&guessed).iter().for_each(|line| say!("{line}"));
+    map.columns.extend(guessed);
+    // The import itself reports everything that is missing or given twice.
+    if args.yes || !map.lacks(grid, args.series).is_empty() || !map.twice().is_empty() {
         return Ok(map);
     }
     if std::io::stdin().is_terminal() && std::io::stderr().is_terminal() {

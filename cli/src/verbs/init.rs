@@ -17,10 +17,14 @@ pub struct Args {
 ///
 /// # Errors
 /// A file that is there already, or cannot be written.
-pub fn run(args: &Args) -> miette::Result<ExitCode> {
+pub fn run(args: &Args, json: bool) -> miette::Result<ExitCode> {
     let text = text(args.kind);
     let Some(path) = &args.out else {
-        out!("{}", text.trim_end());
+        if json {
+            answer_json(&json!({ "kind": args.kind.name(), "text": text }));
+        } else {
+            out!("{}", text.trim_end());
+        }
         return exit(DONE);
     };
     if path.exists() {
@@ -29,6 +33,10 @@ pub fn run(args: &Args) -> miette::Result<ExitCode> {
     let schema = path.with_file_name(format!("{}.schema.json", args.kind.name()));
     write_whole(path, text)?;
     write_whole(&schema, serde_json::to_string_pretty(&args.kind.schema()).into_diagnostic()?)?;
-    say!("{} and {}; next: muprime check {}", path.display(), schema.display(), path.display());
+    if json {
+        answer_json(&json!({ "written": [path, schema] }));
+    } else {
+        say!("{} and {}; next: muprime check {}", path.display(), schema.display(), path.display());
+    }
     exit(DONE)
 }

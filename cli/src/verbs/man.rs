@@ -13,22 +13,32 @@ pub struct Args {
 ///
 /// # Errors
 /// A folder that cannot be written.
-pub fn run(args: &Args, command: &clap::Command) -> miette::Result<ExitCode> {
+pub fn run(args: &Args, command: &clap::Command, json: bool) -> miette::Result<ExitCode> {
     make_folder(&args.folder)?;
     let mut command = command.clone().disable_help_subcommand(true);
     command.build();
-    let count = pages(&command, "muprime", &args.folder)?;
-    say!("{count} pages in {}", args.folder.display());
+    let mut written = Vec::new();
+    pages(&command, "muprime", &args.folder, &mut written)?;
+    if json {
+        answer_json(&json!({ "written": written }));
+    } else {
+        say!("{} pages in {}", written.len(), args.folder.display());
+    }
     exit(DONE)
 }
 
-fn pages(command: &clap::Command, name: &str, folder: &Path) -> miette::Result<usize> {
-    let mut page = Vec::new();
+fn pages(
+    command: &clap::Command,
+    name: &str,
+    folder: &Path,
+    written: &mut Vec<PathBuf>,
+) -> miette::Result<()> {
+    let (path, mut page) = (folder.join(format!("{name}.1")), Vec::new());
     clap_mangen::Man::new(command.clone()).title(name.to_uppercase()).render(&mut page).into_diagnostic()?;
-    write_whole(&folder.join(format!("{name}.1")), &page)?;
-    let mut count = 1;
-    for sub in command.get_subcommands().filter(|s| !s.is_hide_set()) {
-        count += pages(sub, &format!("{name}-{}", sub.get_name()), folder)?;
-    }
-    Ok(count)
+    write_whole(&path, &page)?;
+    written.push(path);
+    command
+        .get_subcommands()
+        .filter(|s| !s.is_hide_set())
+        .try_for_each(|sub| pages(sub, &format!("{name}-{}", sub.get_name()), folder, written))
 }

@@ -324,8 +324,7 @@ fn tripped(trip: &realtime::safety::Trip) -> Value {
 }
 
 fn job(args: &Args) -> miette::Result<Job> {
-    let setup = Setup::load(&args.setup)?;
-    let plan = Plan::load(&args.plan)?;
+    let (setup, plan) = (super::setup(&args.setup)?, super::plan(&args.plan)?);
     let seed = args.seed.unwrap_or(plan.file.seed);
     let out = args.out.clone().unwrap_or_else(|| runs_folder().join(new_name(&plan.file.name)));
     job_of(args, setup, plan, seed, out)
@@ -339,9 +338,7 @@ fn job_of(args: &Args, setup: Setup, plan: Plan, seed: u64, out: PathBuf) -> mie
             if setup.file.virtual_rig.is_none() {
                 miette::bail!("--defects belongs to a virtual rig; '{}' is a real one", setup.file.name);
             }
-            let text = runs::input::text_of(path)?;
-            let defects = sim::defects::Defects::parse(&text);
-            Some(defects.map_err(|e| miette::miette!("{}: {e}", path.display()))?)
+            Some(super::defects(path)?)
         }
     };
     let slider = PathBuf::from(BuiltIn::SpringSlider.name());
@@ -418,7 +415,7 @@ fn tell(summary: &Summary, json: bool) {
             report.cycles,
             report.overruns,
             summary.record_lost,
-            if report.grants.cpus_kept_awake { "without deep sleep" } else { "with deep sleep" }
+            if report.grants.cpus_awake { "without deep sleep" } else { "with deep sleep" }
         );
     }
     if let Some(held) = summary.held.filter(|held| held.share >= 0.01) {
@@ -440,7 +437,10 @@ fn tell(summary: &Summary, json: bool) {
     if summary.passes < summary.planned {
         report!("to resume, repeat the command with --out {}", summary.folder.display());
     }
-    report!("{}", summary.agreement);
+    // Passes that render are not compared with the model.
+    if rendered.is_none() {
+        report!("{}", summary.agreement);
+    }
     if let Some(psi_star) = summary.psi_star {
         report!("{psi_star}");
     }

@@ -3,7 +3,6 @@
 use super::prelude::*;
 use drivers::InstrumentsSetup;
 use instruments::schema::LinkKind;
-use runs::setup::Setup;
 use sim::wire::serial::SerialEmulator;
 use sim::wire::world::{Hands, WorldPlant};
 use sim::wire::{Quantity, SharedPlant};
@@ -47,12 +46,10 @@ pub struct Args {
 /// # Errors
 /// A setup, defects file or address that cannot be used.
 pub fn run(args: Args, json: bool) -> miette::Result<ExitCode> {
-    let setup = Setup::load(&args.setup)?;
+    let setup = super::setup(&args.setup)?;
     let mut config = setup.file.virtual_rig.clone().unwrap_or_default().world();
     if let Some(path) = &args.defects {
-        let text = runs::input::text_of(path)?;
-        config.defects =
-            sim::defects::Defects::parse(&text).map_err(|e| miette::miette!("{}: {e}", path.display()))?;
+        config.defects = super::defects(path)?;
     }
     let world = World::new(&config, args.seed).map_err(|e| miette::miette!("{e}"))?;
     let (world, hands) = WorldPlant::at_hand(world);

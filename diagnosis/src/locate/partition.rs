@@ -26,29 +26,44 @@ fn spread(values: &[f64]) -> f64 {
     (values.iter().map(|v| (v - mean).powi(2)).sum::<f64>() / n).sqrt()
 }
 
-pub(super) fn cuts(places: &[Condition]) -> Vec<Cut> {
-    let one = |covariate: usize| {
-        let values: Vec<f64> =
-            places.iter().map(|p| covariate::COVARIATES[covariate].of(p)).collect::<Option<_>>()?;
-        if covariate::COVARIATES[covariate].role == Role::Climate
-            && spread(&values) < covariate::COVARIATES[covariate].least_spread
-        {
+/// Smallest and largest value of each level: values within 2 % of its smallest one are one setting that
+/// drifted.
+pub(super) fn levels(mut values: Vec<f64>) -> Vec<[f64; 2]> {
+    values.sort_by(f64::total_cmp);
+    let mut list: Vec<[f64; 2]> = Vec::new();
+    for v in values {
+        match list.last_mut() {
+            Some([low, high]) if v <= *low + 0.02 * low.abs() => *high = v,
+            _ => list.push([v, v]),
+        }
+    }
+    list
+}
+
+/// Where each covariate may be cut: between quantiles of the places, and outside the levels of the passes.
+pub(super) fn cuts(passes: &[Condition], places: &[Condition]) -> Vec<Cut> {
+    let one = |index: usize| {
+        let covariate = covariate::COVARIATES[index];
+        let values: Vec<f64> = places.iter().map(|p| covariate.of(p)).collect::<Option<_>>()?;
+        if covariate.role == Role::Climate && spread(&values) < covariate.least_spread {
             return None;
         }
         let mut sorted = values.clone();
         sorted.sort_by(f64::total_cmp);
-        // Between quantiles, so that a cut never falls on a level.
-        let at: Vec<f64> = (1..LEVELS)
+        // Time, place and climate have no levels.
+        let set = passes.iter().filter(|_| covariate.role == Role::Setting);
+        let levels = levels(set.filter_map(|p| covariate.of(p)).collect());
+        let mut at: Vec<f64> = (1..LEVELS)
             .filter_map(|k| {
-                let i = k * (sorted.len() - 1) / LEVELS;
-                let next = sorted[i..].iter().find(|v| **v > sorted[i])?;
-                Some(0.5 * (sorted[i] + next))
+                let quantile = sorted[k * (sorted.len() - 1) / LEVELS];
+                let level = levels.iter().find(|[low, high]| (*low..=*high).contains(&quantile));
+                let end = level.map_or(quantile, |[_, high]| *high);
+                Some(0.5 * (end + sorted.get(sorted.partition_point(|v| *v <= end))?))
             })
             .collect();
-        let mut at = at;
         at.dedup();
         let above = values.iter().map(|v| at.partition_point(|a| a < v) as u8).collect();
-        (!at.is_empty()).then_some(Cut { covariate, at, above })
+        (!at.is_empty()).then_some(Cut { covariate: index, at, above })
     };
     (0..covariate::COVARIATES.len()).filter_map(one).collect()
 }

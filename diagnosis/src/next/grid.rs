@@ -2,6 +2,7 @@
 
 use crate::data::Table;
 use models::condition::Condition;
+use models::prediction::FrictionModel;
 use models::quantity::{Direction, PeakToPeak};
 
 /// Conditions that a design looks at: the product of the levels, evenly thinned to so many.
@@ -72,6 +73,17 @@ pub fn conditions(table: &Table) -> Vec<Condition> {
         list.retain(shown);
     }
     thinned(&list)
+}
+
+/// Change of the lateral force from the reference without vibration, `(1 - mu') mu_0 F_n` (Eq. 5), in N; of
+/// a condition without vibration the friction itself. None outside the model's domain.
+pub fn expected_change_n(wanted: &Condition, model: &dyn FrictionModel, mu0: f64) -> Option<f64> {
+    let coulomb_n = mu0 * wanted.normal_force_n;
+    if wanted.amplitude == PeakToPeak::ZERO {
+        return Some(coulomb_n);
+    }
+    let prediction = model.predict(&Condition { mu0, ..*wanted }).ok()?;
+    Some((1.0 - prediction.mu_relative).abs() * coulomb_n)
 }
 
 /// Directions of the table.

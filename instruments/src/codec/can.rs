@@ -59,7 +59,7 @@ pub fn slcan_line(frame: &CanFrame) -> Vec<u8> {
 
 /// What an adapter says.
 #[derive(Debug, Clone, PartialEq, Eq)]
-pub enum SlcanSaid {
+pub enum SlcanMessage {
     /// A frame came.
     Frame(CanFrame),
     /// The last command was taken.
@@ -82,16 +82,16 @@ const LONGEST_LINE: usize = 30;
 
 impl SlcanReader {
     /// Takes bytes as they come and gives each message to `sink`.
-    pub fn push(&mut self, bytes: &[u8], mut sink: impl FnMut(SlcanSaid)) {
+    pub fn push(&mut self, bytes: &[u8], mut sink: impl FnMut(SlcanMessage)) {
         for &byte in bytes {
             match byte {
                 b'\r' => {
-                    sink(if self.overlong { SlcanSaid::Other } else { understand(&self.line) });
+                    sink(if self.overlong { SlcanMessage::Other } else { understand(&self.line) });
                     self.line.clear();
                     self.overlong = false;
                 }
                 0x07 => {
-                    sink(SlcanSaid::Refused);
+                    sink(SlcanMessage::Refused);
                     self.line.clear();
                     self.overlong = false;
                 }
@@ -102,13 +102,13 @@ impl SlcanReader {
     }
 }
 
-fn understand(line: &[u8]) -> SlcanSaid {
+fn understand(line: &[u8]) -> SlcanMessage {
     match line.first() {
-        None => SlcanSaid::Done,
-        Some(b'z' | b'Z') if line.len() == 1 => SlcanSaid::Done,
-        Some(b't') => frame(line, 3, false).map_or(SlcanSaid::Other, SlcanSaid::Frame),
-        Some(b'T') => frame(line, 8, true).map_or(SlcanSaid::Other, SlcanSaid::Frame),
-        Some(_) => SlcanSaid::Other,
+        None => SlcanMessage::Done,
+        Some(b'z' | b'Z') if line.len() == 1 => SlcanMessage::Done,
+        Some(b't') => frame(line, 3, false).map_or(SlcanMessage::Other, SlcanMessage::Frame),
+        Some(b'T') => frame(line, 8, true).map_or(SlcanMessage::Other, SlcanMessage::Frame),
+        Some(_) => SlcanMessage::Other,
     }
 }
 
@@ -133,7 +133,7 @@ fn frame(line: &[u8], digits: usize, extended: bool) -> Option<CanFrame> {
 mod tests {
     use super::*;
 
-    fn decoded(bytes: &[u8]) -> Vec<SlcanSaid> {
+    fn decoded(bytes: &[u8]) -> Vec<SlcanMessage> {
         let (mut reader, mut all) = (SlcanReader::default(), Vec::new());
         reader.push(bytes, |one| all.push(one));
         all
@@ -143,18 +143,18 @@ mod tests {
     fn lines_both_ways() {
         let frame = CanFrame::new(0x1B4, &[0x02]).unwrap();
         assert_eq!(slcan_line(&frame), b"t1B4102\r");
-        assert_eq!(decoded(b"t1B4102\r"), [SlcanSaid::Frame(frame)]);
-        assert_eq!(decoded(b"t1b410200FF\r"), [SlcanSaid::Frame(frame)], "with a time stamp");
+        assert_eq!(decoded(b"t1B4102\r"), [SlcanMessage::Frame(frame)]);
+        assert_eq!(decoded(b"t1b410200FF\r"), [SlcanMessage::Frame(frame)], "with a time stamp");
         let long = CanFrame::build(0x0123_4567, true, &[1, 2, 3, 4, 5, 6, 7, 8]).unwrap();
         assert_eq!(slcan_line(&long), b"T0123456780102030405060708\r");
-        assert_eq!(decoded(&slcan_line(&long)), [SlcanSaid::Frame(long)]);
+        assert_eq!(decoded(&slcan_line(&long)), [SlcanMessage::Frame(long)]);
     }
 
     #[test]
     fn what_is_no_frame_is_none() {
-        assert_eq!(decoded(b"z\r\r\x07"), [SlcanSaid::Done, SlcanSaid::Done, SlcanSaid::Refused]);
+        assert_eq!(decoded(b"z\r\r\x07"), [SlcanMessage::Done, SlcanMessage::Done, SlcanMessage::Refused]);
         for line in ["t1B49\r", "t1B41\r", "tXYZ0\r", "t1B4102000\r", "V1013\r", "T1B4102\r", "t8001FF\r"] {
-            assert_eq!(decoded(line.as_bytes()), [SlcanSaid::Other], "{line}");
+            assert_eq!(decoded(line.as_bytes()), [SlcanMessage::Other], "{line}");
         }
         let mut noise = vec![b'0'; 100_000];
         noise.extend(b"\rt1B4102\r");

@@ -1,4 +1,4 @@
-//! Candidate effects: what may part reality from the baseline model.
+//! Candidate effects: what may separate measurements from the baseline model.
 //!
 //! | module | purpose |
 //! |---|---|

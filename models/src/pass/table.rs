@@ -10,9 +10,9 @@ use std::io::{Read, Write};
 #[derive(Debug, thiserror::Error)]
 #[allow(missing_docs, reason = "the message of an error says what its fields are")]
 pub enum TableError {
-    /// A column that every table must have is not there.
-    #[error("line 1: the column '{0}' is missing; a point table needs it")]
-    MissingColumn(&'static str),
+    /// Columns that every table must have are not there.
+    #[error("line 1: missing columns: {}; a point table needs them", .0.join(", "))]
+    MissingColumns(Vec<&'static str>),
     /// A column that stands twice.
     #[error("line 1: the column '{0}' stands twice; remove one")]
     DoubleColumn(String),
@@ -30,6 +30,53 @@ pub enum TableError {
     /// A row with the wrong number of cells, or text that is not CSV or UTF-8.
     #[error("{0}")]
     Malformed(#[from] csv::Error),
+}
+
+impl TableError {
+    /// The line from 1, and the column whose cell is at fault, where it is one.
+    pub fn place(&self) -> (u64, Option<&str>) {
+        match self {
+            TableError::MissingColumns(_) => (1, None),
+            TableError::DoubleColumn(column) => (1, Some(column)),
+            TableError::EmptyCell { line, column } | TableError::BadCell { line, column, .. } => {
+                (*line, Some(column))
+            }
+            TableError::NoFrequency { line } => (*line, Some(covariate::FREQUENCY.name)),
+            TableError::Malformed(why) => (why.position().map_or(1, csv::Position::line), None),
+        }
+    }
+}
+
+/// A table as far as it can be read: the passes of good rows, and what is wrong with the others.
+#[derive(Debug, Default)]
+pub struct Readable {
+    /// The passes of good rows, each with the line of its row, from 1.
+    pub passes: Vec<(u64, Pass)>,
+    /// What is wrong, from the first line on; at most [`FAULTS`] are listed.
+    pub faults: Vec<TableError>,
+    /// How many further faults there are.
+    pub further: usize,
+}
+
+/// Faults of a table that are listed one by one.
+pub const FAULTS: usize = 50;
+
+impl Readable {
+    fn fault(&mut self, fault: TableError) {
+        if self.faults.len() < FAULTS { self.faults.push(fault) } else { self.further += 1 }
+    }
+
+    /// The value, or what is no value and one fault more.
+    fn value<T: Default>(&mut self, value: Result<T, TableError>) -> T {
+        value.unwrap_or_else(|fault| {
+            self.fault(fault);
+            T::default()
+        })
+    }
+
+    fn count(&self) -> usize {
+        self.faults.len() + self.further
+    }
 }
 
 /// Columns of numbers that are no covariates, with the range of each and what is needed.
@@ -54,8 +101,10 @@ impl Columns {
     fn of(header: csv::StringRecord) -> Result<Self, TableError> {
         let columns = Columns(header);
         let required = covariate::REQUIRED.iter().filter(|c| !may_lack(c)).map(|c| c.name);
-        for name in std::iter::once("point").chain(required) {
-            columns.place(name).ok_or(TableError::MissingColumn(name))?;
+        let needed = std::iter::once("point").chain(required);
+        let missing: Vec<_> = needed.filter(|name| columns.place(name).is_none()).collect();
+        if !missing.is_empty() {
+            return Err(TableError::MissingColumns(missing));
         }
         let optional = covariate::OPTIONAL.iter().map(|c| c.name);
         let known =
@@ -138,32 +187,37 @@ impl Row<'_> {
         self.cell(column).map(parse).transpose()
     }
 
-    fn pass(&self) -> Result<Pass, TableError> {
-        let point = self.required("point")?;
-        let point = point.parse().map_err(|_| self.bad("point", point, "a whole number"))?;
+    /// The pass of the row, or every cell of it that is at fault.
+    fn pass(&self, found: &mut Readable) -> Option<Pass> {
+        let faults = found.count();
+        let point = self.required("point");
+        let point =
+            point.and_then(|text| text.parse().map_err(|_| self.bad("point", text, "a whole number")));
+        let point = found.value(point);
         let mut condition = Condition::paper();
         for c in covariate::REQUIRED {
-            let Some(text) = self.cell(c.name) else {
-                self.may_be_empty(c, &condition)?;
-                continue;
-            };
-            c.put(&mut condition, self.covariate(c, text)?);
+            match self.cell(c.name) {
+                // What cannot be read is zero here: a bad amplitude needs no frequency, and is one fault.
+                Some(text) => c.put(&mut condition, found.value(self.covariate(c, text))),
+                None => found.value(self.may_be_empty(c, &condition)),
+            }
         }
         for c in covariate::OPTIONAL {
             if let Some(text) = self.cell(c.name) {
-                c.put(&mut condition, self.covariate(c, text)?);
+                c.put(&mut condition, found.value(self.covariate(c, text)));
             }
         }
-        Ok(Pass {
-            normal_force_sd_n: self.number("normal_force_sd_n")?,
-            lateral_force_sd_n: self.number("lateral_force_sd_n")?,
-            samples: self.count("samples")?,
-            phase_shift_deg: self.number("phase_shift_deg")?,
-            replicate: self.count("replicate")?,
+        let pass = Pass {
+            normal_force_sd_n: found.value(self.number("normal_force_sd_n")),
+            lateral_force_sd_n: found.value(self.number("lateral_force_sd_n")),
+            samples: found.value(self.count("samples")),
+            phase_shift_deg: found.value(self.number("phase_shift_deg")),
+            replicate: found.value(self.count("replicate")),
             run: self.cell("run").map(str::to_string),
-            session: self.count("session")?,
-            ..Pass::at(point, &condition, self.number("lateral_force_n")?)
-        })
+            session: found.value(self.count("session")),
+            ..Pass::at(point, &condition, found.value(self.number("lateral_force_n")))
+        };
+        (found.count() == faults).then_some(pass)
     }
 }
 
@@ -176,6 +230,24 @@ impl Row<'_> {
 /// # Errors
 /// The first fault with its line: a missing column, an empty or unreadable cell, a malformed row.
 pub fn read_passes(from: impl Read) -> Result<Vec<Pass>, TableError> {
+    let mut found = read_readable(from);
+    if found.faults.is_empty() {
+        Ok(found.passes.into_iter().map(|(_, pass)| pass).collect())
+    } else {
+        Err(found.faults.swap_remove(0))
+    }
+}
+
+/// The same of a table that may have faults: all of them are in what it returns.
+pub fn read_readable(from: impl Read) -> Readable {
+    let mut found = Readable::default();
+    if let Err(fault) = read_into(from, &mut found) {
+        found.fault(fault);
+    }
+    found
+}
+
+fn read_into(from: impl Read, found: &mut Readable) -> Result<(), TableError> {
     let mut reader = csv::ReaderBuilder::new().trim(csv::Trim::All).from_reader(from);
     let mut header = reader.headers()?.clone();
     // Spreadsheets put a byte-order mark before the first name.
@@ -185,20 +257,29 @@ pub fn read_passes(from: impl Read) -> Result<Vec<Pass>, TableError> {
         header = csv::StringRecord::from(names);
     }
     let columns = Columns::of(header)?;
-    let mut passes = Vec::new();
+    let (mut stated, mut lacking) = (None, Vec::new());
     for record in reader.records() {
-        let cells = record?;
+        let cells = match record {
+            // The reader goes on behind a row that is malformed, not behind a file that cannot be read.
+            Err(why) if !why.is_io_error() => {
+                found.fault(why.into());
+                continue;
+            }
+            record => record?,
+        };
         let line = cells.position().map_or(0, csv::Position::line);
         let row = Row { cells: &cells, columns: &columns, line };
-        let lacks_frequency = row.cell(covariate::FREQUENCY.name).is_none();
-        passes.push((row.pass()?, lacks_frequency));
+        let Some(pass) = row.pass(found) else { continue };
+        match row.cell(covariate::FREQUENCY.name) {
+            Some(_) => stated = stated.or(Some(pass.frequency_hz)),
+            None => lacking.push(found.passes.len()),
+        }
+        found.passes.push((line, pass));
     }
-    let stated = passes.iter().find(|(_, lacks)| !lacks).map(|(pass, _)| pass.frequency_hz);
-    let filled = passes.into_iter().map(|(pass, lacks)| match stated {
-        Some(frequency_hz) if lacks => Pass { frequency_hz, ..pass },
-        _ => pass,
-    });
-    Ok(filled.collect())
+    if let Some(frequency_hz) = stated {
+        lacking.into_iter().for_each(|at| found.passes[at].1.frequency_hz = frequency_hz);
+    }
+    Ok(())
 }
 
 /// Writes a point table with every column of docs/contract.md; missing values are empty cells. Numbers have
@@ -266,7 +347,9 @@ mod tests {
     #[test]
     fn faults_name_their_line_and_column() {
         let error = |text: &str| read_passes(text.as_bytes()).unwrap_err().to_string();
-        assert!(error("point,time_s\n1,2\n").contains("'amplitude_pp_m' is missing"));
+        assert!(
+            error("point,time_s\n1,2\n").contains("missing columns: amplitude_pp_m, speed_m_s, direction,")
+        );
         let rows = |row: &str| format!("{HEAD}\n1,0,2e-6,27500,0.02,1,0,0.25,0.1\n{row}\n");
         assert!(
             error(&rows("2,0,-2e-6,27500,0.02,1,0,0.25,0.1"))
@@ -276,6 +359,25 @@ mod tests {
         assert!(error(&rows("2,0,NaN,27500,0.02,1,0,0.25,0.1")).contains("'NaN'"));
         assert!(error(&rows("2,,2e-6,27500,0.02,1,0,0.25,0.1")).contains("'time_s' is empty"));
         assert!(error(&rows("2,0,2e-6")).contains("line: 3"));
+    }
+
+    #[test]
+    fn every_fault_of_a_table_is_found_with_its_place() {
+        let rows =
+            "x,0,two,,0.02,1,0,0.25,0.1\n2,1,2e-6\n3,2,2e-6,,0.02,3,0,0.25,0.1\n4,3,0,,0.02,1,0,0.25,0.1\n";
+        let found = read_readable(format!("{HEAD}\n{rows}").as_bytes());
+        let places: Vec<_> = found.faults.iter().map(TableError::place).collect();
+        let expected = [
+            (2, Some("point")),
+            (2, Some("amplitude_pp_m")),
+            (3, None),
+            (4, Some("frequency_hz")),
+            (4, Some("direction")),
+        ];
+        assert_eq!(places, expected, "{:?}", found.faults);
+        assert_eq!((found.passes.len(), found.passes[0].0, found.further), (1, 5, 0));
+        let many = read_readable(format!("{HEAD}\n{}", "1,0,x,,0.02,1,0,0.25,0.1\n".repeat(70)).as_bytes());
+        assert_eq!((many.faults.len(), many.further), (FAULTS, 20));
     }
 
     /// Plain tribometers state neither a frequency nor a place.

@@ -160,10 +160,10 @@ impl Rig {
         body.count_energy(settings.energy);
         stability::add_mass(&mut body, plate.penalty(), settings.added_mass);
         let stable = stability::contact_step_s(&body, plate.penalty());
-        if let Some(asked_s) = settings.step_s
-            && !(asked_s > 0.0 && asked_s <= stable)
+        if let Some(wanted_s) = settings.step_s
+            && !(wanted_s > 0.0 && wanted_s <= stable)
         {
-            return Err(RidgeError::UnstableStep { asked_s, stable_s: stable });
+            return Err(RidgeError::UnstableStep { wanted_s, stable_s: stable });
         }
         let bin = 1.0 / (case.frequency_hz * BINS as f64);
         let per_bin = (bin / settings.step_s.unwrap_or(stable)).ceil().max(1.0) as usize;

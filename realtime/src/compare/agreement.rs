@@ -4,6 +4,7 @@
 //! up what it should judge. So agreement needs passes with vibration, a scatter of their residuals that is
 //! the stated one, and power: the departure of `mu'` that would have been seen must be small.
 
+use super::sequential::{BETS, PULLS};
 use super::{ALARM_LEVEL, PassComparison};
 use serde::{Deserialize, Serialize};
 
@@ -121,28 +122,35 @@ impl std::fmt::Display for Agreement {
 #[derive(Clone, Copy, Debug, Default)]
 pub(super) struct Power {
     taken_up: [f64; 3],
-    shift: f64,
+    /// Mean of each bet's score under a unit departure, and the score's variance.
+    shift: [f64; PULLS],
+    information: [f64; PULLS],
     judged: u32,
     squares: f64,
 }
 
 impl Power {
     /// Takes a pass: the force of a unit departure in N, the slope of the prediction, the filter's gain and
-    /// the innovation's variance; `z` where the pass was judged with vibration.
+    /// the innovation's variance; `pulls` of the bets where the pass was judged, `z` where also with
+    /// vibration.
     pub(super) fn push(
         &mut self,
         unit_n: f64,
         slope: &[f64; 3],
         gain: &[f64; 3],
         variance: f64,
+        pulls: Option<[f64; PULLS]>,
         z: Option<f64>,
     ) {
         let seen = unit_n - super::dot(slope, &self.taken_up);
         for (taken, gain) in self.taken_up.iter_mut().zip(gain) {
             *taken += gain / variance * seen;
         }
+        for (i, pull) in pulls.into_iter().flatten().enumerate() {
+            self.shift[i] += pull * seen / variance.sqrt();
+            self.information[i] += pull * pull;
+        }
         if let Some(z) = z {
-            self.shift += seen / variance.sqrt();
             self.squares += z * z;
             self.judged += 1;
         }
@@ -158,14 +166,17 @@ impl Power {
         (self.judged > 0).then(|| (self.squares / f64::from(self.judged)).sqrt())
     }
 
-    /// Departure of `mu'` that the bet on a shift in the passes with vibration would have seen with 90 %.
+    /// Departure of `mu'` that the best of the bets on shifts would have seen with 90 %. What the shared
+    /// parameters take up turns the sign of what later passes show, so one bet alone may see little of it.
     ///
-    /// The bet's score is normal with mean `departure * shift` and variance n; it alarms from where
-    /// `score^2 / (2 (1 + n)) - ln(1 + n) / 2` passes the logarithm of bets over level.
-    pub(super) fn visible(&self, bets: usize) -> Option<f64> {
-        let n = f64::from(self.judged);
-        let needed = 2.0 * ((bets as f64).ln() - ALARM_LEVEL.ln()) + (1.0 + n).ln();
-        let score = ((1.0 + n) * needed).sqrt() + POWER_90 * n.sqrt();
-        (self.shift.abs() > 0.0).then(|| score / self.shift.abs())
+    /// A bet's score is normal with mean `departure * shift` and variance n, its information; it alarms from
+    /// where `score^2 / (2 (1 + n)) - ln(1 + n) / 2` passes the logarithm of bets over level.
+    pub(super) fn visible(&self) -> Option<f64> {
+        let by = |(shift, n): (&f64, &f64)| {
+            let needed = 2.0 * ((BETS as f64).ln() - ALARM_LEVEL.ln()) + (1.0 + n).ln();
+            (((1.0 + n) * needed).sqrt() + POWER_90 * n.sqrt()) / shift.abs()
+        };
+        let least = self.shift.iter().zip(&self.information).map(by).fold(f64::INFINITY, f64::min);
+        (self.judged > 0 && least.is_finite()).then_some(least)
     }
 }

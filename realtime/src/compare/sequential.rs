@@ -20,10 +20,21 @@ pub(super) const CAP: f64 = 4.0;
 
 /// Directions in which a departure may pull: the same way always, with the sliding direction, with the
 /// amplitude, with the speed.
-const PULLS: usize = 4;
+pub(super) const PULLS: usize = 4;
 
 /// Number of bets that are averaged.
 pub(super) const BETS: usize = PULLS + SCATTERS.len();
+
+/// How strongly a departure at a condition pulls, by each of the four bets on shifts.
+pub(super) fn pulls(c: &Condition) -> [f64; PULLS] {
+    let vibrating = f64::from(u8::from(c.amplitude.metres() > 0.0));
+    [
+        vibrating,
+        c.direction.sign(),
+        (c.amplitude.metres() / 2.5e-6 - 1.0).clamp(-1.0, 1.0) * vibrating,
+        ((c.speed_m_s / 0.02).ln() / 2.0).clamp(-1.0, 1.0) * vibrating,
+    ]
+}
 
 /// The running evidence.
 #[derive(Clone, Copy, Debug)]
@@ -48,14 +59,7 @@ impl Sequential {
     /// Takes a standardised residual and the condition it came from (fixed before the residual was seen).
     pub(super) fn push(&mut self, z: f64, c: &Condition) {
         let z = z.clamp(-CAP, CAP);
-        let vibrating = f64::from(u8::from(c.amplitude.metres() > 0.0));
-        let pulls = [
-            vibrating,
-            c.direction.sign(),
-            (c.amplitude.metres() / 2.5e-6 - 1.0).clamp(-1.0, 1.0) * vibrating,
-            ((c.speed_m_s / 0.02).ln() / 2.0).clamp(-1.0, 1.0) * vibrating,
-        ];
-        for (i, pull) in pulls.into_iter().enumerate() {
+        for (i, pull) in pulls(c).into_iter().enumerate() {
             self.score[i] += pull * z;
             self.information[i] += pull * pull;
         }

@@ -41,7 +41,16 @@ fn compared(
     seed: u64,
     mu_relative: impl Fn(f64, PeakToPeak) -> f64,
 ) -> Vec<PassComparison> {
-    let model = SpringSlider::new(Finger::paper()).unwrap();
+    compared_with(Finger::paper(), conditions, seed, mu_relative)
+}
+
+fn compared_with(
+    finger: Finger,
+    conditions: &[Condition],
+    seed: u64,
+    mu_relative: impl Fn(f64, PeakToPeak) -> f64,
+) -> Vec<PassComparison> {
+    let model = SpringSlider::new(finger).unwrap();
     let mut comparator = Comparator::new(&model, 0.45, NOISE);
     let mut draw = Deviates(seed);
     conditions
@@ -89,16 +98,32 @@ fn scatter_beyond_the_stated_noise_is_no_agreement() {
     assert!(!matches!(Agreement::of(passes.last(), true), Agreement::Agrees { .. }));
 }
 
-/// The departure that is reported as visible is seen nine times in ten; half of it much more rarely.
+/// The departure that is reported as visible is seen nine times in ten; a third of it much more rarely.
 #[test]
 fn the_stated_power_is_what_simulated_departures_show() {
-    let conditions = sweep(24);
-    let visible = compared(&conditions, 1, |mu, _| mu).last().unwrap().visible_departure.unwrap();
+    power_of(&sweep(24), Finger::paper());
+}
+
+/// Stiffnesses that are known to 5 % take up a part of a common deviation, and what is left of it changes
+/// its sign with the amplitude: the bet on a common shift alone saw 0.052 here, and half of runs showed a
+/// third of it.
+#[test]
+fn the_power_is_that_of_the_bet_that_sees_most() {
+    let finger = Finger { stiffness_relative_sd: 0.05, ..Finger::paper() };
+    let conditions: Vec<Condition> = [0.005, 0.01, 0.03, 0.08]
+        .iter()
+        .flat_map(|speed| sweep(12).into_iter().map(|c| Condition { speed_m_s: *speed, ..c }))
+        .collect();
+    power_of(&conditions, finger);
+}
+
+fn power_of(conditions: &[Condition], finger: Finger) {
+    let visible = compared_with(finger, conditions, 1, |mu, _| mu).last().unwrap().visible_departure.unwrap();
     assert!(visible < VISIBLE_DEPARTURE, "{visible}");
     let seen = |departure: f64| {
         let run = |seed: u64| {
             let with = |mu, w: PeakToPeak| if w > PeakToPeak::ZERO { mu + departure } else { mu };
-            compared(&conditions, 1000 + seed, with).last().is_some_and(|p| p.departed)
+            compared_with(finger, conditions, 1000 + seed, with).last().is_some_and(|p| p.departed)
         };
         (0..400u64).filter(|s| run(*s)).count() as f64 / 400.0
     };

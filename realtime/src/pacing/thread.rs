@@ -89,7 +89,7 @@ pub fn run(parts: LoopParts, pacing: impl Into<Pacing>) -> LoopReport {
         }
     }
     let awake = pacing.keep_cpus_awake.then(keep_cpus_awake);
-    grants.cpus_kept_awake = matches!(awake, Some(Ok(_)));
+    grants.cpus_awake = matches!(awake, Some(Ok(_)));
     if let Some(Err(why)) = &awake {
         grants.pace_refused = Some(format!("/dev/cpu_dma_latency: {why}"));
     }

@@ -336,7 +336,7 @@ impl<R: Read + Seek> Reader<R> {
         }
     }
 
-    /// What the last words say of the messages, held against those that came.
+    /// What the last words say of the messages, compared with those that came.
     fn heard(&mut self, entry: &Entry) {
         let Entry::Facts { name, facts } = entry else { return };
         if name == RECOVERED {

@@ -1,4 +1,5 @@
-//! The rules, each with its requirement identifier. Add a rule: one variant, one line in [`RULES`], one function.
+//! The rules, each with its requirement identifier. Add a rule: a variant with words and remedy in
+//! `cause.rs`, one line in [`RULES`] and one function here.
 
 use super::arming::{CutFor, SUPPLY_ACTS};
 use super::cause::{Cause, Unit};
@@ -111,7 +112,7 @@ rules! {
     "SR-17" NormalFrozen [Count] "A normal channel does not repeat its raw value more often than its noise allows." => |c| frozen(c, c.watch.normal.equal_in_a_row);
     "SR-18" Noisy [Count] "Fewer than five spikes in fifty cycles on either force." => |c| broken(spikes(c) >= 5, f64::from(spikes(c)), 5.0);
     "SR-19" AmplifierStale [Second] "The amplifier's state is no older than its own periods and latency allow." => |c| state_stale(c.seen.amplifier.map(|a| a.taken_at), c.limits.timing.amplifier.age_limit(), c.now);
-    "SR-20" AmplifierFault [Flag] "An amplifier that reports a fault, or values that are not numbers, is switched off." => |c| broken(c.seen.amplifier.is_ok_and(|a| a.fault || !told_in_numbers(&a)), 1.0, 0.0);
+    "SR-20" AmplifierFault [Flag] "An amplifier that reports a fault, or values that are not numbers, is switched off." => |c| broken(c.seen.amplifier.is_ok_and(|a| a.fault || !is_numeric(&a)), 1.0, 0.0);
     "SR-21" AmplifierWatchdog [Flag] "An amplifier whose own watchdog has fired is switched off." => |c| broken(c.seen.amplifier.is_ok_and(|a| a.watchdog_tripped) && c.watch.enabled, 1.0, 0.0);
     "SR-22" DriveNoResponse [Metre] "A driven plate vibrates: at least a fifth of the commanded amplitude after ring-up." => no_response;
     "SR-23" EchoMismatch [Metre, Hertz, Flag] "The amplifier echoes the set-point that it was given, within its resolution, and shows itself on while it is driven." => echo;
@@ -261,7 +262,7 @@ fn supply_switch(c: &Context<'_>) -> Option<(f64, f64)> {
             Some((c.now.since(state.taken_at).seconds(), limit))
         }
         Ok(state) => {
-            let cut = c.watch.supply_told == SupplyCommand::Cut;
+            let cut = c.watch.supply_commanded == SupplyCommand::Cut;
             let waited = c.now.since(c.watch.supply_since);
             broken(state.cut != cut && waited > SUPPLY_ACTS, waited.seconds(), SUPPLY_ACTS.seconds())
         }
@@ -309,7 +310,7 @@ fn amplitude_pp_m(c: &Context<'_>) -> Option<f64> {
 /// An amplitude is not negative; the noise of a sensor at rest may make it a little so.
 const AMPLITUDE_NOISE_M: f64 = -0.3e-6;
 
-fn told_in_numbers(a: &AmplifierState) -> bool {
+fn is_numeric(a: &AmplifierState) -> bool {
     a.amplitude.map_or(true, |r| r.value >= AMPLITUDE_NOISE_M && r.value.is_finite())
         && a.echoed_frequency_hz.is_finite()
         && a.echoed_amplitude.metres().is_finite()

@@ -212,7 +212,7 @@ pub(super) struct Watch {
     pub load_n: f64,
     pub load_since: Nanos,
     /// The last command to the second channel, and since when.
-    pub supply_told: SupplyCommand,
+    pub supply_commanded: SupplyCommand,
     pub supply_since: Nanos,
     /// Whether the dead-man device is held, and whether it was seen released since the last trip: a hand that
     /// lets go and grips again is a person who confirms.
@@ -232,7 +232,7 @@ impl Watch {
             lateral: ForceWatch::new(),
             normal: ForceWatch::new(),
             off_since: Some(Nanos(0)),
-            supply_told: SupplyCommand::Restore,
+            supply_commanded: SupplyCommand::Restore,
             ..Self::default()
         }
     }
@@ -329,8 +329,8 @@ impl Watch {
 
     pub(super) fn commanded(&mut self, decision: &Decision, now: Nanos) {
         let (drive, stage) = (&decision.drive, &decision.stage);
-        if decision.supply != self.supply_told {
-            (self.supply_told, self.supply_since) = (decision.supply, now);
+        if decision.supply != self.supply_commanded {
+            (self.supply_commanded, self.supply_since) = (decision.supply, now);
         }
         if stage.normal_force_n() != self.load_n {
             (self.load_n, self.load_since) = (stage.normal_force_n(), now);

@@ -35,7 +35,7 @@ pub fn series(way: &SeriesOptions<'_>) -> miette::Result<String> {
         None => None,
         Some(name) => {
             let setup = Setup::load(name)?;
-            _claim = Some(crate::rig_lock::RigClaim::take(&setup)?);
+            _claim = Some(crate::rig_lock::RigLock::take(&setup)?);
             Some(drivers::open(&setup.instruments(), epoch).map_err(|e| miette::miette!("{e}"))?)
         }
     };

@@ -7,7 +7,7 @@
 
 mod drive;
 
-use crate::rig_lock::RigClaim;
+use crate::rig_lock::RigLock;
 use drive::Drive;
 use drivers::vibrometer::Settings;
 use models::quantity::PeakToPeak;
@@ -32,7 +32,7 @@ pub fn table(setup: &Setup, table: &LiveTable<'_>) -> miette::Result<String> {
     check(setup, table)?;
     let settings = super::vibrometer(setup, table.frequency_hz)?;
     say!("vibrometer: {settings}");
-    let _claim = RigClaim::take(setup)?;
+    let _claim = RigLock::take(setup)?;
     let drive = Drive::start(setup)?;
     let taken = take(table, &drive, &settings);
     // Whatever became of the table: off first, and its report was read back.

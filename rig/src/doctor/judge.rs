@@ -56,7 +56,8 @@ pub struct Target<'a> {
 
 /// More answers than this that are none are a fault of the link: a run goes on over single ones.
 const BAD_SHARE: f64 = 0.01;
-/// A channel that shows fewer of its samples than this is remarked in a run, and trips it at half of that.
+/// A channel that shows fewer of its samples than this will not pass here. A run remarks below 0.85 and
+/// trips below 0.25 (`realtime::safety::rules`).
 const CAME_SHARE: f64 = 0.5;
 /// Looks that may find nothing valid, and samples at the range's ends.
 const INVALID_SHARE: f64 = 0.01;

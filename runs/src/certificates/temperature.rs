@@ -1,4 +1,4 @@
-//! Temperature ranges of certificates, held against what the instruments report while the rig runs.
+//! Temperature ranges of certificates, compared with what the instruments report while the rig runs.
 //!
 //! The check when a setup is read knows only the temperature that somebody read off at the bench. Here the
 //! amplifier's own channel (its own or the plate's temperature) is looked at when a pass begins to be

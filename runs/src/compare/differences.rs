@@ -1,7 +1,9 @@
 //! What differs between two runs besides what was measured: setup, plan, model, seed, versions, fingertip.
 
+use crate::input::in_si;
 use crate::run_dir::RecordFacts;
-use serde::Serialize;
+use serde::{Deserialize, Serialize};
+use std::collections::BTreeMap;
 
 /// Facts that say when a run was and not what it was.
 const TIMES: [&str; 1] = ["start_unix_ns"];
@@ -17,12 +19,30 @@ pub struct Difference {
     pub b: Option<String>,
 }
 
+/// A value that is numbers, whatever the unit that it was written in.
+#[derive(PartialEq, Deserialize)]
+#[serde(untagged)]
+enum Numbers {
+    One(f64),
+    List(Vec<f64>),
+}
+
+/// The numbers of a key in SI: `2um` is 2e-6.
+fn numbers(name: &str, value: &str) -> Option<BTreeMap<String, Numbers>> {
+    let key = name.rsplit(['.', ' ']).next()?;
+    toml::from_str(&in_si(&format!("{key} = {value}"))).ok()
+}
+
 /// What differs, by name.
 pub fn between(a: &RecordFacts, b: &RecordFacts) -> Vec<Difference> {
     let mut names: Vec<&String> = a.keys().chain(b.keys()).collect();
     names.sort_unstable();
     names.dedup();
-    let differs = |name: &&String| !TIMES.contains(&name.as_str()) && a.get(*name) != b.get(*name);
+    let equal = |name: &str| match (a.get(name), b.get(name)) {
+        (Some(a), Some(b)) => a == b || numbers(name, a).is_some_and(|of| Some(of) == numbers(name, b)),
+        _ => false,
+    };
+    let differs = |name: &&String| !TIMES.contains(&name.as_str()) && !equal(name);
     let difference =
         |name: &String| Difference { what: name.clone(), a: a.get(name).cloned(), b: b.get(name).cloned() };
     names.into_iter().filter(differs).map(difference).collect()

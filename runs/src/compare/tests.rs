@@ -129,6 +129,20 @@ fn the_common_shift_is_that_of_the_full_matrix() {
 }
 
 #[test]
+fn one_value_in_two_units_is_no_difference() {
+    let facts = |amplitude: &str, frequencies: &str| {
+        crate::run_dir::RecordFacts::from([
+            ("plan.toml: base.amplitude_pp_m".into(), amplitude.into()),
+            ("plan.toml: frequency_hz".into(), frequencies.into()),
+        ])
+    };
+    let (words, numbers) = (facts("\"2um\"", "[\"27.5kHz\", 30000]"), facts("2e-6", "[27500, 3e4]"));
+    assert_eq!(differences::between(&words, &numbers), []);
+    let differ = differences::between(&words, &facts("\"3um\"", "[27500, 3e4]"));
+    assert_eq!((differ.len(), differ[0].a.as_deref()), (1, Some("\"2um\"")));
+}
+
+#[test]
 fn the_same_seed_in_virtual_time_and_the_same_bytes_are_reported() {
     let facts = |seed: &str, clock: &str| {
         crate::run_dir::RecordFacts::from([("seed".into(), seed.into()), ("clock".into(), clock.into())])

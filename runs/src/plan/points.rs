@@ -188,7 +188,13 @@ impl Plan {
                     input::place_of(&self.text, &["base", name])
                 };
                 let remedy = unit_meant(name, value, [low, high]).unwrap_or_else(|| {
-                    "change the plan, or the [limits] of the setup below the hard limits".into()
+                    match value <= 0.0 && low >= 0.0 {
+                        true if value < 0.0 => {
+                            format!("{name} is a magnitude: write it without the minus sign")
+                        }
+                        true => format!("give {name} a value above zero"),
+                        false => "change the plan, or the [limits] of the setup below the hard limits".into(),
+                    }
                 });
                 let low = if low == f64::MIN_POSITIVE { 0.0 } else { low };
                 let [value, low, high] = [value, low, high].map(|v| quantity(v, input::unit_of(name)));
@@ -257,6 +263,21 @@ pub(crate) fn series_place(text: &str, index: usize, name: &str) -> Option<std::
 #[cfg(test)]
 mod tests {
     use super::*;
+
+    /// Two series without a load of their own: the base's was reported twice, with the rig's limits as the
+    /// remedy.
+    #[test]
+    fn a_negative_load_is_one_problem_and_its_minus_sign_the_remedy() {
+        let text = "name = \"p\"\n[base]\namplitude_pp_m = 2e-6\nfrequency_hz = 27500\nspeed_m_s = 0.02\n\
+                    normal_force_n = -0.25\n[[series]]\namplitude_pp_m = [1e-6]\n[[series]]\nspeed_m_s = [0.04]\n";
+        let plan = Plan::parse("p", text).unwrap();
+        let limits = Limits::paper(realtime::ports::Nanos(1_000_000));
+        let resolution = Resolution { amplitude_pp_m: 0.0, frequency_hz: 0.0 };
+        let why = plan.points(1, &limits, &resolution).unwrap_err();
+        assert!(why.to_string().starts_with("normal_force_n = -0.25 N is outside"), "{why}");
+        let help = why.help().unwrap().to_string();
+        assert_eq!(help, "normal_force_n is a magnitude: write it without the minus sign");
+    }
 
     /// Two series that list the same pressures: each of their passes was made twice, and a pressure was
     /// visited again.

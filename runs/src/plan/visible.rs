@@ -5,9 +5,9 @@ use super::points::series_place;
 use super::{Plan, Point, Resolution};
 use crate::input::BadInput;
 use crate::report::human::quantity;
+use diagnosis::next::grid::expected_change_n;
 use models::condition::Condition;
 use models::prediction::FrictionModel;
-use models::quantity::PeakToPeak;
 
 /// Counts of the sensor that the largest expected change of a series must span. One count either way is
 /// rounding of the two readings whose difference is taken; four leave a curve of some shape.
@@ -105,15 +105,6 @@ impl Plan {
         }
         Ok(())
     }
-}
-
-fn expected_change_n(wanted: &Condition, model: &dyn FrictionModel, mu0: f64) -> Option<f64> {
-    let coulomb_n = mu0 * wanted.normal_force_n;
-    if wanted.amplitude == PeakToPeak::ZERO {
-        return Some(coulomb_n);
-    }
-    let prediction = model.predict(&Condition { mu0, ..*wanted }).ok()?;
-    Some((1.0 - prediction.mu_relative).abs() * coulomb_n)
 }
 
 #[cfg(test)]

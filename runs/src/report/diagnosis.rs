@@ -14,7 +14,7 @@ use super::html::{bar, columns, escape, glossary, head, list, note, shell, table
 use super::human::number;
 use super::plots::beyond;
 use super::plots::verdict::{Seen, errors_against};
-use crate::verdict::plain;
+use crate::verdict::{listed, looks_like, plain};
 use diagnosis::Verdict;
 use diagnosis::data::Table;
 use diagnosis::describe::probability;
@@ -56,12 +56,9 @@ pub fn page(result: &Diagnosis, table: &Table, about: &[(&str, String)]) -> miet
 /// What an unknown departure looks like, and what is sure under an open verdict; nothing else.
 fn described(result: &Diagnosis) -> String {
     let r = &result.report;
-    let lines = r.description.iter().map(|d| {
-        format!("{} ({} against no gap)", d.text, crate::verdict::odds_base10(d.log10_odds_vs_no_gap))
-    });
     let sure = (!r.at_least.is_empty())
         .then(|| format!("At least {}, beside what is open.", plain(&r.at_least.join(", "))));
-    let all: Vec<String> = lines.chain(sure).collect();
+    let all: Vec<String> = looks_like(result).chain(sure).collect();
     if all.is_empty() {
         String::new()
     } else {
@@ -107,20 +104,8 @@ fn how_far(result: &Diagnosis) -> String {
 
 fn location(result: &Diagnosis, table: &Table, errors: &[(f64, f64)]) -> String {
     let r = &result.report;
-    let listed: Vec<String> = r
-        .location
-        .regions
-        .iter()
-        .filter(|g| g.share_of_gap >= 0.01)
-        .take(LISTED_REGIONS)
-        .map(|g| g.text.clone())
-        .collect();
-    let rest = r.location.regions.len() - listed.len();
-    let more = if rest > 0 {
-        note(&format!("And {rest} smaller parts, in the JSON document."))
-    } else {
-        String::new()
-    };
+    let (listed, rest) = listed(&r.location.regions, LISTED_REGIONS);
+    let more = rest.map_or_else(String::new, |rest| note(&format!("{rest} (in the JSON document).")));
     let places: Vec<String> = r
         .location
         .place

@@ -105,7 +105,7 @@ const WORDS: [(&str, &str); 11] = [
     ),
     (
         "verdict's model",
-        "That baseline with the effects that the verdict names, and a smooth departure from their form; where none is named, the mean of the hypotheses with the most evidence.",
+        "That baseline with the effects that the verdict names, and a smooth departure from their form; where none is named, the average of the likeliest models.",
     ),
     ("gap", "What the baseline leaves of the measurement beyond its repeatability."),
     ("repeatability", "Scatter of passes at one condition."),

@@ -55,6 +55,26 @@ pub fn to_its_uncertainty(value: f64, sd: f64) -> String {
     format!("{value:.digits$}")
 }
 
+/// A value with its standard uncertainty, unit and 95 % interval: all to the second digit of the
+/// uncertainty, and by one power of ten; a pure number has no unit.
+pub fn with_uncertainty(value: f64, sd: f64, [low, high]: [f64; 2], unit: &str) -> String {
+    let (stated, size) = (sd.is_finite() && sd > 0.0, value.abs().max(sd));
+    let exponent = match stated && !(1e-3..1e6).contains(&size) && size.is_finite() {
+        true => size.log10().floor() as i32,
+        false => 0,
+    };
+    let factor = 10f64.powi(-exponent);
+    let digits = if stated { (1 - (sd * factor).log10().floor() as i32).max(0) as usize } else { 0 };
+    let [v, s, l, h] =
+        [value, sd, low, high].map(|x| if stated { format!("{:.digits$}", x * factor) } else { number(x) });
+    let scaled = |text: String| match exponent {
+        0 => text,
+        tens => format!("({text})\u{d7}10{}", raised(tens)),
+    };
+    let unit = if unit == "1" || unit.is_empty() { String::new() } else { format!(" {unit}") };
+    format!("{}{unit} (95 %: {})", scaled(format!("{v} +- {s}")), scaled(format!("{l} to {h}")))
+}
+
 /// A value with its interval and unit, in one scale: `0.0766 [0.05, 0.11] 1/um²`. Units that are not listed
 /// stay as they are, and a pure number has none.
 pub fn with_interval(value: f64, [low, high]: [f64; 2], unit: &str) -> String {
@@ -105,6 +125,30 @@ mod tests {
         assert_eq!([shown(119.5273, 0.36), shown(0.36, 0.36)], ["119.53", "0.36"]);
         assert_eq!([shown(3300.077, 24.0), shown(1.5e-7, 1e-9)], ["3300", "1.50\u{d7}10\u{207b}\u{2077}"]);
         assert_eq!([shown(2.0, 0.0), shown(54.98706, 9.9e-4)], ["2", "54.98706"]);
+    }
+
+    #[test]
+    fn a_value_and_its_uncertainty_have_the_same_digits() {
+        for (value, sd, ci, unit, shown) in [
+            (
+                3.7e6,
+                113_292.0,
+                [3.48e6, 3.92e6],
+                "N/m",
+                "(3.70 +- 0.11)\u{d7}10\u{2076} N/m (95 %: (3.48 to 3.92)\u{d7}10\u{2076})",
+            ),
+            (0.4155, 0.0033, [0.409, 0.422], "1", "0.4155 +- 0.0033 (95 %: 0.4090 to 0.4220)"),
+            (
+                0.03009,
+                4.28e-4,
+                [0.02917, 0.03101],
+                "rad",
+                "0.03009 +- 0.00043 rad (95 %: 0.02917 to 0.03101)",
+            ),
+            (2.0, 0.0, [2.0, 2.0], "s", "2 +- 0 s (95 %: 2 to 2)"),
+        ] {
+            assert_eq!(super::with_uncertainty(value, sd, ci, unit), shown);
+        }
     }
 
     #[test]

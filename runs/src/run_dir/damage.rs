@@ -8,8 +8,9 @@ use std::fs::{self, File};
 use std::io::BufReader;
 use std::path::Path;
 
-/// What is damaged in a run's folder: its records from their first byte to their last, and its table held against its journal.
-/// Empty where nothing is; a session that was killed or is still going has a record that is cut.
+/// What is damaged in a run's folder: its records from their first byte to their last, and its table
+/// compared with its journal. Empty where nothing is; a session that was killed or is still going has a
+/// record that is cut.
 ///
 /// # Errors
 /// A folder that cannot be read.

@@ -55,7 +55,7 @@ pub(super) struct Arming {
     overrun: Nanos,
     human_contact: bool,
     /// The cut of the supply was reported already.
-    cut_told: bool,
+    cut_reported: bool,
     /// The last cycle that was seen to prove the second channel.
     proving: Option<u64>,
 }
@@ -75,7 +75,7 @@ impl Arming {
     /// no news.
     pub(super) fn afresh(self) -> Self {
         let Arming { overrun, human_contact, .. } = self;
-        Arming { overrun, human_contact, cut_told: true, ..Arming::new() }
+        Arming { overrun, human_contact, cut_reported: true, ..Arming::new() }
     }
 
     /// Takes a row.
@@ -93,7 +93,7 @@ impl Arming {
                 return Next::GiveUp(Outcome::Tripped(trip));
             }
             self.disturbed = Some(trip);
-            self.cut_told = trip.cause == Cause::EmergencyStop;
+            self.cut_reported = trip.cause == Cause::EmergencyStop;
             return Next::Again(self.disturbed_by(trip.cause));
         }
         self.proving = row.proving.then_some(row.cycle).or(self.proving);
@@ -112,8 +112,8 @@ impl Arming {
             return Next::Wait;
         }
         // What was cut before anything was armed, and needs no person, was cut for a silent emergency stop.
-        let event = (row.supply_cut && !self.cut_told).then(|| self.disturbed_by(Cause::EmergencyStop));
-        (self.requested, self.held_up, self.cut_told) = (Some(row.now), Nanos(0), false);
+        let event = (row.supply_cut && !self.cut_reported).then(|| self.disturbed_by(Cause::EmergencyStop));
+        (self.requested, self.held_up, self.cut_reported) = (Some(row.now), Nanos(0), false);
         self.asks += 1;
         Next::Ask(event)
     }

@@ -90,7 +90,7 @@ pub(super) struct AtRig {
     wait: Option<Wait>,
     then: Option<Then>,
     disarmed: bool,
-    asked_again: u32,
+    repeats: u32,
     begun: bool,
     /// When the rig was last seen off and at rest while a person was at it.
     quiet: Nanos,
@@ -488,13 +488,13 @@ impl Sequence {
         {
             let (value, source) = (found.value, found.source);
             out.events.push(Event::LevelReached { quantity, wanted, found: value, source, after_s });
-            (self.at_rig.level[at], self.at_rig.asked_again) = (Some(wanted), 0);
+            (self.at_rig.level[at], self.at_rig.repeats) = (Some(wanted), 0);
             return self.done(row, out);
         }
-        let again = by_hand && self.at_rig.asked_again < ASKS;
+        let again = by_hand && self.at_rig.repeats < ASKS;
         if again {
             // A gauge that shows something else: the question comes again.
-            self.at_rig.asked_again += 1;
+            self.at_rig.repeats += 1;
             return self.next_task(row, out);
         }
         if by_hand || after_s > self.at_rig.reached_within_s {

@@ -5,7 +5,7 @@ use super::drive::Drive;
 use super::{Service, SharedPlant};
 use instruments::FrameId;
 use instruments::bus::{CanEvent, CanPort};
-use instruments::codec::can::{CanFrame, SlcanReader, SlcanSaid, slcan_line};
+use instruments::codec::can::{CanFrame, SlcanMessage, SlcanReader, slcan_line};
 use instruments::profile::{FrameKind, Part};
 use instruments::schema::LinkKind;
 use realtime::ports::Nanos;
@@ -59,7 +59,7 @@ impl CanPort for EmulatedAdapter {
                 Ok(count) => {
                     let waiting = &mut self.waiting;
                     self.reader.push(&buffer[..count], |message| {
-                        if let SlcanSaid::Frame(frame) = message {
+                        if let SlcanMessage::Frame(frame) = message {
                             waiting.push_back(frame);
                         }
                     });

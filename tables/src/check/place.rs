@@ -30,12 +30,15 @@ pub fn problems_of(report: &miette::Report) -> Vec<Problem> {
     all
 }
 
+/// Line and column of a problem from 1, and the file that it is in.
+fn place_of(of: &dyn miette::Diagnostic) -> Option<(usize, usize, Option<String>)> {
+    let label = of.labels()?.next()?;
+    let span = of.source_code()?.read_span(label.inner(), 0, 0).ok()?;
+    Some((span.line() + 1, span.column() + 1, span.name().map(str::to_string)))
+}
+
 fn one(of: &dyn miette::Diagnostic) -> Problem {
-    let label = of.labels().and_then(|mut labels| labels.next());
-    let place = label.zip(of.source_code()).and_then(|(label, code)| {
-        let span = code.read_span(label.inner(), 0, 0).ok()?;
-        Some((span.line() + 1, span.column() + 1))
-    });
+    let place = place_of(of).map(|(line, column, _)| (line, column));
     Problem {
         problem: of.to_string(),
         line: place.map(|(line, _)| line),
@@ -47,7 +50,9 @@ fn one(of: &dyn miette::Diagnostic) -> Problem {
 /// A refusal whose every problem has a place in the file, where the file has such a key, and a remedy.
 pub fn with_place_and_help(report: miette::Report, name: &str, kind: Option<&str>) -> miette::Report {
     let found = problems_of(&report);
-    if found.iter().all(|p| p.line.is_some() && p.help.is_some()) {
+    // A place in a file that this one names stays there.
+    let other = place_of(report.as_ref()).and_then(|(.., file)| file).is_some_and(|file| file != name);
+    if other || found.iter().all(|p| p.line.is_some() && p.help.is_some()) {
         return report;
     }
     let Ok(text) = text_of(name) else {
@@ -141,10 +146,15 @@ pub(super) fn remedy(kind: Option<&str>) -> String {
                 "docs/reference.md lists the keys of a {kind} with their ranges; `muprime init {kind}` prints one that holds"
             )
         }
-        Some("rig.toml") => "docs/contract.md shows one; `muprime run` and `muprime import` write it".into(),
+        Some("campaign") => {
+            "docs/reference.md lists the keys of a campaign; `muprime show part2-campaign` prints one".into()
+        }
+        Some("rig.toml") => "`muprime run` and `muprime import` write one (docs/contract.md); it needs at least [finger] with \
+            `normal_stiffness_n_per_m` and `lateral_stiffness_n_per_m`"
+            .into(),
         Some("certificate") => "a certificate is not edited: make a new one with `muprime calibrate`".into(),
         Some("model") => "write a new one with `muprime diagnose --save-model`".into(),
-        Some("defects file") => "docs/setup.md names the defects and their parameters".into(),
+        Some("defects file") => "docs/reference.md lists the defects with their parameters".into(),
         Some("table") => {
             "`muprime import` makes a point table of a foreign one; docs/contract.md lists the columns".into()
         }

@@ -144,7 +144,9 @@ fn node(root: &Value, schema: &Value, value: &Node<'_>, path: &str, wrong: &mut 
     }
     let is = value.is();
     if !admits(schema, &is) {
-        let problem = format!("{} is {}; {} is needed", here(path), words(&is), wanted(schema));
+        let key = path.rsplit('.').next().and_then(|key| key.split('[').next()).unwrap_or_default();
+        let unit = unit_of(key);
+        let problem = format!("{} is {}; {} is needed", here(path), words(&is), wanted(schema, unit));
         // A number in quotation marks is judged as the number.
         let number = match &is {
             Is::Text(text) if admits(schema, &Is::Number) => {
@@ -155,14 +157,14 @@ fn node(root: &Value, schema: &Value, value: &Node<'_>, path: &str, wrong: &mut 
             }
             _ => None,
         };
-        let mend = value.span().zip(number);
-        let key = path.rsplit('.').next().and_then(|key| key.split('[').next()).unwrap_or_default();
-        let remedy = match &is {
-            Is::Text(text) if admits(schema, &Is::Number) && !unit_of(key).is_empty() => {
-                runs::quantity::parse(text, unit_of(key)).err()
+        let remedy = match (&is, &number) {
+            (_, Some(number)) => Some(format!("write it without quotation marks: {number}")),
+            (Is::Text(text), _) if admits(schema, &Is::Number) && !unit.is_empty() => {
+                runs::quantity::parse(text, unit).err()
             }
             _ => None,
         };
+        let mend = value.span().zip(number);
         wrong.push(Wrong { place: value.span(), problem, remedy, mend });
         return;
     }
@@ -215,7 +217,9 @@ fn object(
                 let problem = format!("the key {} is not known", key(name));
                 let remedy =
                     nearest(name, &known).unwrap_or_else(|| format!("keys here: {}", known.join(", ")));
-                let free = |meant: &&str| !entries.iter().any(|(key, ..)| key == meant);
+                // Of a key in another unit nobody wrote a value in this one.
+                let free =
+                    |meant: &&str| in_its_unit(name, meant) && !entries.iter().any(|(key, ..)| key == meant);
                 let mend = match (nearest_of(name, &known).filter(free), span, value.span()) {
                     (Some(meant), Some(key), _) => Some((key.clone(), meant.to_string())),
                     (None, Some(key), Some(value)) => Some((key.start..value.end, String::new())),
@@ -277,7 +281,7 @@ fn words(is: &Is<'_>) -> &'static str {
     }
 }
 
-fn wanted(schema: &Value) -> String {
+fn wanted(schema: &Value, unit: &str) -> String {
     let names: Vec<&str> = match &schema["type"] {
         Value::String(name) => vec![name],
         Value::Array(names) => names.iter().filter_map(Value::as_str).filter(|n| *n != "null").collect(),
@@ -289,6 +293,7 @@ fn wanted(schema: &Value) -> String {
             "array" => "a list in [ ]",
             "string" => "text in quotes",
             "integer" => "a whole number",
+            "number" if !unit.is_empty() => "a number, or a text with its unit,",
             "number" => "a number",
             "boolean" => "true or false",
             other => other,
@@ -300,7 +305,16 @@ fn wanted(schema: &Value) -> String {
 
 /// The known name that a misspelt one is nearest to.
 fn nearest(name: &str, known: &[&str]) -> Option<String> {
-    nearest_of(name, known).map(|best| format!("did you mean `{best}`?"))
+    nearest_of(name, known).map(|best| match in_its_unit(name, best) {
+        true => format!("did you mean `{best}`?"),
+        false => format!("did you mean `{best}`? It is in {}, or a text with its unit", unit_of(best)),
+    })
+}
+
+/// Whether a misspelt key names the unit of the key that was meant, or none.
+fn in_its_unit(name: &str, meant: &str) -> bool {
+    let unit = unit_of(meant);
+    unit.is_empty() || unit == unit_of(name) || meant.starts_with(&format!("{name}_"))
 }
 
 fn nearest_of<'k>(name: &str, known: &[&'k str]) -> Option<&'k str> {
@@ -357,6 +371,40 @@ mod tests {
             let kind = Kind::all().find(|k| k.name() == bundled.kind).unwrap();
             assert_eq!(problems_of(kind, bundled.text), "", "{}", bundled.name);
         }
+    }
+
+    #[test]
+    fn a_value_in_another_unit_is_not_judged_as_if_it_were_in_this_one() {
+        let setup = runs::bundled::text(runs::setup::BUNDLED, "virtual-ideal").unwrap();
+        let wrong = setup.replacen("[limits]", "[limits]\nspeed_max_mm_s = 250", 1);
+        let meant = as_meant(&Kind::Setup.schema(), &wrong).unwrap();
+        assert!(!meant.contains("250"), "{meant}");
+        assert_eq!(
+            nearest("speed_max_mm_s", &["speed_max_m_s"]).unwrap(),
+            "did you mean `speed_max_m_s`? It is in m/s, or a text with its unit"
+        );
+    }
+
+    #[test]
+    fn texts_in_place_of_numbers_have_a_remedy() {
+        let plan = runs::bundled::text(runs::plan::BUNDLED, "first-sweep").unwrap();
+        let helps = |from: &str, to: &str| {
+            let text = plan.replacen(from, to, 1);
+            assert_ne!(text, plan);
+            let mut problems = Problems::of("file", &text);
+            toml(&Kind::Plan.schema(), &text, &mut problems);
+            let why = problems.end().unwrap_err();
+            format!("{why}: {}", why.help().unwrap())
+        };
+        let help = helps("normal_force_n = 0.25", "normal_force_n = \"0,9 N\"");
+        assert!(
+            help.ends_with(
+                "a number, or a text with its unit, is needed: a number has a decimal point: 0.9 N"
+            ),
+            "{help}"
+        );
+        let help = helps("normal_force_n = 0.25", "normal_force_n = \"0.9\"");
+        assert!(help.ends_with("write it without quotation marks: 0.9"), "{help}");
     }
 
     #[test]

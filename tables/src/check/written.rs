@@ -5,7 +5,6 @@ use super::{Good, On, judge, kind_of, read_json, shape};
 use crate::import::remarks;
 use crate::schemas::schema::Kind;
 use miette::{IntoDiagnostic, WrapErr};
-use models::pass::read_passes;
 use runs::input::{MAX_TABLE_BYTES, Problems, bytes_of};
 use std::path::Path;
 
@@ -31,12 +30,9 @@ pub(super) fn table(path: &Path) -> miette::Result<Good> {
         crate::law::own_effects(&[path.to_path_buf()])?;
         return Ok(Good { kind: "effect table", passes: None, remarks: Vec::new() });
     }
-    let passes = read_passes(&bytes[..]);
-    let help = remedy(Some("table"));
-    let passes = passes.map_err(|e| miette::miette!(help = help.clone(), "{e}"))?;
+    let passes = super::cells::passes(&path.display().to_string(), &bytes)?;
     let mut good = Good { kind: "table", passes: Some(passes.len()), remarks: Vec::new() };
     if passes.iter().all(|p| p.lateral_force_n.is_none()) {
-        passes.iter().try_for_each(diagnosis::data::check).into_diagnostic()?;
         good.kind = "table of conditions";
     } else {
         diagnosis::data::Table::measured(&passes).into_diagnostic()?;

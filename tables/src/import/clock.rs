@@ -29,7 +29,8 @@ pub fn is_time(cell: &Cell) -> bool {
     reading(cell).is_some()
 }
 
-/// A workbook's time, `12:34:56.7`, `1:02 PM`, with a date before it where there is one (`2024-03-01`).
+/// A workbook's time, `12:34:56.7`, `1:02 PM`, with a date before it where there is one (`2024-03-01`,
+/// `01.03.2024`; one with slashes may begin with the month or the day, and is refused).
 fn reading(cell: &Cell) -> Option<Reading> {
     let text = match cell {
         Cell::Clock(seconds) => {
@@ -61,8 +62,12 @@ fn reading(cell: &Cell) -> Option<Reading> {
     let days = match date {
         None => 0.0,
         Some(date) => {
-            let mut numbers = date.split('-').map(|n| n.parse::<i64>());
-            let (y, m, d) = (numbers.next()?.ok()?, numbers.next()?.ok()?, numbers.next()?.ok()?);
+            let dotted = date.contains('.');
+            let parts: Vec<&str> = date.split(if dotted { '.' } else { '-' }).collect();
+            let number = |k: usize| parts.get(k)?.parse::<i64>().ok();
+            // A year of two digits might be a day.
+            let m = number(1).filter(|_| parts.len() == 3 && (!dotted || parts[2].len() == 4))?;
+            let (y, d) = if dotted { (number(2)?, number(0)?) } else { (number(0)?, number(2)?) };
             if !(0..=9999).contains(&y) || !(1..=12).contains(&m) || !(1..=31).contains(&d) {
                 return None;
             }
@@ -194,6 +199,12 @@ mod tests {
         assert_eq!(day("2024-02-28 23:59:59", "2024-03-01T00:00:00Z"), 86_401.0);
         assert_eq!(day("2023-12-31 00:00:00", "2024-12-31 00:00:00"), 366.0 * 86_400.0);
         assert_eq!((at("1:02:03 PM"), at("12:00:01 am")), (Some(46_923.0), Some(1.0)));
+        assert_eq!(day("29.02.2024 23:59:50,625", "2024-03-01 00:00:00"), 9.375);
+        assert_eq!(day("01.03.2024 23:59:50,5", "2.3.2024 00:00:01,5"), 11.0);
+        for ambiguous in ["01/03/2024 10:00:00", "01.03.24 10:00:00", "01.13.2024 10:00:00", "01.03 10:00:00"]
+        {
+            assert_eq!(at(ambiguous), None, "{ambiguous}");
+        }
         assert_eq!(at("1.5"), None);
         assert_eq!(at("a:b"), None);
     }

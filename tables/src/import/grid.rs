@@ -139,6 +139,13 @@ impl Grid {
         Grid { format, header, rows, ..Grid::default() }
     }
 
+    /// The name of a column as a map takes it: its header, its number where another column has the same one.
+    pub fn name(&self, column: usize) -> String {
+        let header = &self.header[column];
+        let same = self.header.iter().filter(|h| h.eq_ignore_ascii_case(header)).count();
+        if same > 1 { format!("#{}", column + 1) } else { header.clone() }
+    }
+
     /// The cell of a row under a column of the table, wherever that column is under the row's own header.
     pub fn cell<'a>(&self, row: &'a Row, column: usize) -> Option<&'a Cell> {
         let at = match row.block.checked_sub(1) {

@@ -1,7 +1,7 @@
 //! What headers usually mean, and the units that they state.
 
 use super::grid::{Cell, Grid};
-use super::map::Taken;
+use super::map::{Map, Taken, stated, unit_row};
 use super::targets::{ColumnKind, Id, TARGETS, plain};
 use super::units::{Dimension, Unit};
 
@@ -18,12 +18,21 @@ fn all_differ(grid: &Grid, index: usize) -> bool {
     values.len() > 3 && values.windows(2).all(|pair| pair[0] != pair[1])
 }
 
-/// A map from the headers: names that usually mean one thing, with the units that the headers state. A header
-/// that two columns answer to is left to the reader.
-pub fn guess(grid: &Grid) -> Vec<Taken> {
+/// The columns that `stated` leaves open, from the headers: names that usually mean one thing, with the units
+/// that the headers state. A header that two columns answer to is left to the reader.
+pub fn guess(grid: &Grid, stated: &Map) -> Vec<Taken> {
+    let is_open = |target: usize| {
+        let column = TARGETS[target].column;
+        let otherwise = stated.time_by_rows && column == Id::Time.target().column
+            || stated.has(Id::Velocity) && target == Id::Direction as usize;
+        !otherwise && !stated.gives(column)
+    };
     let mut taken: Vec<Taken> = Vec::new();
     for (index, header) in grid.header.iter().enumerate() {
-        let row_of_units = grid.units.get(index).map(String::as_str).filter(|u| !u.is_empty());
+        if stated.columns.iter().any(|c| c.index == index) {
+            continue;
+        }
+        let row_of_units = unit_row(&grid.units, index);
         // Structures and recorders put their own name before a point.
         let inner = || header.split_once('.').filter(|(_, name)| name.len() > 1);
         let found = meant(header, row_of_units).or_else(|| meant(inner()?.1, row_of_units));
@@ -38,6 +47,9 @@ pub fn guess(grid: &Grid) -> Vec<Taken> {
             t if t == Id::FrictionForce as usize && negative => Id::LateralForce as usize,
             t => t,
         };
+        if !is_open(target) {
+            continue;
+        }
         let dimension = match TARGETS[target].kind {
             ColumnKind::Number(dimension) => Some(dimension),
             _ => None,
@@ -56,7 +68,7 @@ pub fn guess(grid: &Grid) -> Vec<Taken> {
         {
             continue;
         }
-        taken.push(Taken { index, header: header.clone(), target, unit_text, unit, assumed });
+        taken.push(Taken { index, header: grid.name(index), target, unit_text, unit, assumed });
     }
     // A force that is read goes before a coefficient that was made of it.
     let forces = |t: &Taken| TARGETS[t.target].column == "lateral_force_n";
@@ -84,7 +96,8 @@ pub fn heads(text: &str) -> bool {
 }
 
 /// Words that say how an amplitude is counted.
-const STROKES: [(&str, Id); 22] = [
+const STROKES: [(&str, Id); 23] = [
+    ("spitze-spitze", Id::AmplitudePp),
     ("peak-to-peak", Id::AmplitudePp),
     ("peak to peak", Id::AmplitudePp),
     ("peak_to_peak", Id::AmplitudePp),
@@ -119,6 +132,15 @@ fn without_stroke(header: &str) -> Option<(String, Id)> {
         let alone = apart(small[..at].chars().next_back()) && apart(small[end..].chars().next());
         alone.then(|| (format!("{} {}", &header[..at], &header[end..]), *id))
     })
+}
+
+/// The unit that the source states for a column that is taken for `target`: in a row of units or in the
+/// header.
+pub fn unit_of(grid: &Grid, index: usize, target: usize) -> Option<(String, Unit)> {
+    let ColumnKind::Number(dimension) = TARGETS[target].kind else { return None };
+    let (header, row) = (&grid.header[index], unit_row(&grid.units, index));
+    let plainly = row.or_else(|| stated(header)).and_then(|text| Unit::guess(dimension, text));
+    plainly.or_else(|| meant(header, row).filter(|(at, _)| TARGETS[*at].kind == TARGETS[target].kind)?.1)
 }
 
 /// What a header means, and the unit that it states: in brackets, after a slash or a comma, or as its last words.

@@ -4,6 +4,12 @@ use super::grid::{Block, Cell, Grid, Row};
 use super::guess::{heads, name_of};
 use super::units::is_unit;
 
+/// Why a text among the rows is left out.
+pub const ONE_TEXT: &str = "one text, no row of the table";
+
+/// What cures a table without rows.
+pub const NO_ROWS_HELP: &str = "export the table with its rows of numbers";
+
 /// What the rows were had from.
 #[derive(Clone, Debug, Default)]
 pub struct Source {
@@ -260,7 +266,7 @@ impl Source {
         };
         let cells = row.width();
         let why = if cells == 1 && names > 1 && self.numbers(&row) == 0 {
-            Some("one text, no row of the table".to_string())
+            Some(ONE_TEXT.to_string())
         } else if !self.places && (cells > names || self.blanks && cells < names) {
             Some(format!("{cells} cells in place of {names}"))
         } else {

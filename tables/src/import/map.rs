@@ -1,6 +1,7 @@
 //! Which column of the source is what: stated by `--map` and `--set`, or guessed from the headers.
 
 use super::grid::{Block, Grid};
+use super::guess::unit_of;
 use super::targets::{ColumnKind, Id, TARGETS, Target};
 use super::units::{Dimension, Unit};
 
@@ -139,12 +140,14 @@ impl Map {
         if wrong.is_empty() { Ok(()) } else { Err(wrong) }
     }
 
-    /// What stands in the way of a table: columns that are given twice, and all that are missing with what
-    /// would give each. The position of a series says speed and direction as well.
-    pub fn lacks(&self, series: bool) -> Vec<String> {
-        let mut wrong = Vec::new();
-        let all: Vec<usize> =
-            self.columns.iter().map(|c| c.target).chain(self.constants.iter().map(|c| c.target)).collect();
+    /// The places of all targets that are mapped or set.
+    fn targets(&self) -> Vec<usize> {
+        self.columns.iter().map(|c| c.target).chain(self.constants.iter().map(|c| c.target)).collect()
+    }
+
+    /// Columns of the point table that are given more than once, in sentences; [`ONCE`] is the remedy.
+    pub fn twice(&self) -> Vec<String> {
+        let (mut wrong, all) = (Vec::new(), self.targets());
         for (k, target) in TARGETS.iter().enumerate() {
             let same = |t: &&usize| TARGETS[**t].column == target.column;
             let first = TARGETS.iter().position(|t| t.column == target.column);
@@ -158,8 +161,25 @@ impl Map {
         if self.time_by_rows && self.has(Id::Time) {
             wrong.push("time_s is mapped and set".into());
         }
+        wrong
+    }
+
+    /// Whether the plate vibrates in some row, as far as amplitudes are given.
+    fn vibrates(&self, grid: &Grid) -> bool {
+        let is_amplitude = |target: usize| TARGETS[target].column == Id::AmplitudePp.target().column;
+        let value = |c: &Taken, r| c.unit.apply(&grid.cell(r, c.index)?.digits(grid.comma)?);
+        let in_rows = |c: &Taken| grid.rows.iter().any(|r| value(c, r).is_some_and(|a| a > 0.0));
+        self.constants.iter().any(|c| is_amplitude(c.target) && c.value > 0.0)
+            || self.columns.iter().any(|c| is_amplitude(c.target) && in_rows(c))
+    }
+
+    /// All columns of the point table that are missing, with what would give each. The position of a series
+    /// gives speed and direction as well; a plate that stands still needs no frequency.
+    pub fn lacks(&self, grid: &Grid, series: bool) -> Vec<String> {
+        let (mut wrong, all) = (Vec::new(), self.targets());
         let gives = |column: &str| all.iter().any(|t| TARGETS[*t].column == column);
         let by_path = series && gives("position_m");
+        let still = gives("amplitude_pp_m") && !self.vibrates(grid);
         let needed = [
             (
                 "time_s",
@@ -170,6 +190,11 @@ impl Map {
                 "amplitude_pp_m",
                 false,
                 "HEADER=amplitude_pp:um (or amplitude_peak, amplitude_rms), or --set amplitude_pp_m=0 where nothing vibrates",
+            ),
+            (
+                "frequency_hz",
+                still,
+                "HEADER=frequency:kHz, or --set frequency_hz=27500; without vibration none is needed",
             ),
             (
                 "speed_m_s",
@@ -190,12 +215,18 @@ impl Map {
         ];
         for (column, otherwise, how) in needed {
             if !gives(column) && !otherwise {
-                wrong.push(format!("{column} is missing: {how}"));
+                let path = column == "speed_m_s" && gives("position_m");
+                let more =
+                    if path { ", or --series if the rows are samples of a record in time" } else { "" };
+                wrong.push(format!("{column} is missing: {how}{more}"));
             }
         }
         wrong
     }
 }
+
+/// What cures a column that is given more than once.
+pub const ONCE: &str = "keep one of them: name it in --map, and leave the other out of --map and --set";
 
 /// Entries at commas outside of double quotes.
 fn parted(text: &str) -> Vec<String> {
@@ -215,8 +246,9 @@ fn names() -> String {
     TARGETS.iter().map(|t| t.name).collect::<Vec<_>>().join(", ")
 }
 
-/// The target and the unit of `TARGET[:UNIT]`. The name of a column of the point table states its unit.
-fn target_of(text: &str) -> Result<(usize, Unit, String), MapError> {
+/// The target and the unit of `TARGET[:UNIT]`. The name of a column of the point table states its unit; of
+/// any other it may be `written` in the source beyond doubt.
+fn target_of(text: &str, written: Option<&str>) -> Result<(usize, Unit, String), MapError> {
     let (name, unit_text) =
         text.split_once(':').map_or((text.trim(), None), |(n, u)| (n.trim(), Some(u.trim())));
     let own = || name.to_string();
@@ -236,7 +268,10 @@ fn target_of(text: &str) -> Result<(usize, Unit, String), MapError> {
             Ok((at, Unit::parse(dimension, text).ok_or_else(unknown)?, text.to_string()))
         }
         None if bare => Ok((at, Unit::SI, dimension.si().to_string())),
-        None => Err(MapError::NeedsUnit { name: own(), dimension }),
+        None => written
+            .and_then(|w| Unit::guess(dimension, w).filter(|(_, u)| Unit::parse(dimension, w) == Some(*u)))
+            .map(|(text, unit)| (at, unit, text))
+            .ok_or_else(|| MapError::NeedsUnit { name: own(), dimension }),
     }
 }
 
@@ -247,7 +282,6 @@ fn column(grid: &Grid, entry: &str) -> Result<Taken, MapError> {
     let last = header.rsplit('/').next().unwrap_or(header);
     let header =
         if !grid.within.is_empty() && *header == format!("{}{last}", grid.within) { last } else { header };
-    let (target, unit, unit_text) = target_of(rest)?;
     let numbered = header.strip_prefix('#').and_then(|n| n.parse::<usize>().ok());
     let exact: Vec<usize> = (0..grid.header.len()).filter(|k| grid.header[*k] == header).collect();
     // A map that was copied from a terminal may be broken over lines within a header.
@@ -264,7 +298,21 @@ fn column(grid: &Grid, entry: &str) -> Result<Taken, MapError> {
         }
         _ => return Err(MapError::SeveralColumns(header.into())),
     };
-    Ok(Taken { index, header: grid.header[index].clone(), target, unit_text, unit, assumed: false })
+    let written = unit_row(&grid.units, index).or_else(|| stated(&grid.header[index]));
+    let (target, unit, unit_text) = target_of(rest, written)?;
+    Ok(Taken { index, header: grid.name(index), target, unit_text, unit, assumed: false })
+}
+
+/// Columns whose unit in the map is another than in the source, in sentences. A sign is no other unit.
+pub fn contradicted(map: &Map, grid: &Grid) -> Vec<String> {
+    let size = |unit: &Unit| (unit.factor().abs(), unit.offset().abs());
+    let contradiction = |c: &Taken| {
+        let (text, unit) = unit_of(grid, c.index, c.target)?;
+        let words = "the map was taken: correct it if the header is right";
+        let both = format!("{}: the header says {text}, the map says {}; {words}", c.header, c.unit_text);
+        (size(&unit) != size(&c.unit)).then_some(both)
+    };
+    map.columns.iter().filter_map(contradiction).collect()
 }
 
 fn constant(entry: &str) -> Result<Option<Constant>, MapError> {
@@ -294,8 +342,10 @@ fn constant(entry: &str) -> Result<Option<Constant>, MapError> {
 /// A direction as people write it.
 pub fn way(text: &str) -> Option<f64> {
     match text.trim().to_lowercase().as_str() {
-        "forward" | "fwd" | "f" | "trace" => return Some(1.0),
-        "backward" | "bwd" | "b" | "retrace" | "reverse" | "rev" => return Some(-1.0),
+        "forward" | "fwd" | "f" | "trace" | "vor" | "vorwärts" => return Some(1.0),
+        "backward" | "bwd" | "b" | "retrace" | "reverse" | "rev" | "zurück" | "rückwärts" => {
+            return Some(-1.0);
+        }
         _ => {}
     }
     let value = Unit::SI.apply(text)?;
@@ -318,7 +368,6 @@ pub fn under(map: &Map, grid: &Grid, block: &Block) -> Result<Option<Map>, MapEr
         let (row, header) = (block.place, column.header.clone());
         let missing = || MapError::NotUnder { row, header: header.clone() };
         let index = there(column).ok_or_else(missing)?;
-        let unit_row = |units: &[String], at: usize| units.get(at).filter(|u| !u.is_empty()).cloned();
         let (was, is) = (unit_row(&grid.units, column.index), unit_row(&block.units, index));
         if grid.header[column.index] != block.header[index] || was != is {
             let ColumnKind::Number(dimension) = TARGETS[column.target].kind else {
@@ -329,8 +378,8 @@ pub fn under(map: &Map, grid: &Grid, block: &Block) -> Result<Option<Map>, MapEr
                 (Some(unit), None) | (None, Some(unit)) => Unit::guess(dimension, unit),
                 _ => None,
             };
-            let first = stated(&grid.header[column.index], was.as_deref());
-            let second = stated(&block.header[index], is.as_deref());
+            let first = stated(&grid.header[column.index], was);
+            let second = stated(&block.header[index], is);
             match (first, second) {
                 (Some((_, first)), Some((_, second))) if first == column.unit => column.unit = second,
                 (Some((_, first)), Some((_, second))) if first == second => {}
@@ -342,8 +391,13 @@ pub fn under(map: &Map, grid: &Grid, block: &Block) -> Result<Option<Map>, MapEr
     Ok(Some(own))
 }
 
+/// The unit of a column in a row of units.
+pub fn unit_row(units: &[String], at: usize) -> Option<&str> {
+    units.get(at).map(String::as_str).filter(|u| !u.is_empty())
+}
+
 /// The unit that a header states in brackets, or after a slash, a comma or 'in'.
-fn stated(header: &str) -> Option<&str> {
+pub fn stated(header: &str) -> Option<&str> {
     for (open, close) in [('[', ']'), ('(', ')')] {
         if let Some((_, rest)) = header.split_once(open) {
             return rest.split(close).next();
@@ -360,7 +414,7 @@ mod tests {
 
     fn guessed(text: &str) -> String {
         let grid = read(text.as_bytes(), Marks::default()).unwrap();
-        Map { columns: guess(&grid), ..Map::default() }.written()
+        Map { columns: guess(&grid, &Map::default()), ..Map::default() }.written()
     }
 
     #[test]
@@ -421,9 +475,10 @@ mod tests {
     #[test]
     fn all_that_is_missing_is_told_at_once() {
         let mut map = Map::default();
-        assert_eq!(map.lacks(false).len(), 6);
+        let lacks = |map: &Map| map.lacks(&Grid::default(), false);
+        assert_eq!(lacks(&map).len(), 7);
         map.set(&["time_s=rows, direction=forward, speed=10:mm/s".into()]).unwrap();
         assert_eq!(map.constants[1].value, 0.01);
-        assert_eq!(map.lacks(false).len(), 3, "{:?}", map.lacks(false));
+        assert_eq!(lacks(&map).len(), 4, "{:?}", lacks(&map));
     }
 }

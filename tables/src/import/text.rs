@@ -2,7 +2,7 @@
 
 use super::clock::is_time;
 use super::grid::{Cell, Grid, Row};
-use super::head::Source;
+use super::head::{NO_ROWS_HELP, Source};
 use super::units::Unit;
 use miette::IntoDiagnostic;
 
@@ -56,10 +56,7 @@ pub fn read(bytes: &[u8], marks: Marks) -> miette::Result<Grid> {
                 (Some(delimiter), known.map_or("a delimiter of its own", |(_, name)| name))
             }
             None if one_column(&data) => (None, "lines: one column"),
-            None => miette::bail!(
-                help = "give the delimiter (--delimiter ';'), or export the table as CSV",
-                "no rows of numbers: no delimiter separates the lines into columns"
-            ),
+            None => return Err(no_rows(&data, !heads.is_empty(), &tried)),
         };
     let cells = |line: &str, usual: usize| match delimiter {
         None => Ok(vec![line.to_string()]),
@@ -82,6 +79,22 @@ pub fn read(bytes: &[u8], marks: Marks) -> miette::Result<Grid> {
         grid.notes.push(format!("{} comment lines were passed over, the first in line {first}", heads.len()));
     }
     Ok(grid)
+}
+
+/// The refusal of a text without numbers: it is empty, nothing is below its header, or no delimiter serves.
+fn no_rows(lines: &[(u64, &str)], comments: bool, tried: &[char]) -> miette::Report {
+    // Blanks part any words.
+    let parts = |line: &str, d: char| d != ' ' && split(line, d).is_ok_and(|cells| cells.len() > 1);
+    let other = "give the delimiter (--delimiter ';'), or export the table as CSV";
+    let (help, why) = match lines.last() {
+        None if comments => (NO_ROWS_HELP, ": the file holds comment lines alone".to_string()),
+        None => (NO_ROWS_HELP, ": the file is empty".to_string()),
+        Some((place, last)) if tried.iter().any(|d| parts(last, *d)) => {
+            (NO_ROWS_HELP, format!(" below the header (line {place} is the last)"))
+        }
+        Some(_) => (other, ": no delimiter separates the lines into columns".to_string()),
+    };
+    miette::miette!(help = help, "no rows of numbers{why}")
 }
 
 /// The text and its encoding: by byte-order mark, UTF-8 where it is that, else Latin-1, in which any byte is a letter.

@@ -10,6 +10,11 @@ use models::pass::Pass;
 use models::quantity::PeakToPeak;
 use serde::Serialize;
 
+/// Why a cell of a number is not taken.
+pub const NO_NUMBER: &str = "no number";
+/// Why a cell of a time is not taken.
+pub const NO_TIME: &str = "neither a number nor a time of day";
+
 /// A row that is left out, and why.
 #[derive(Clone, Debug, PartialEq, Serialize)]
 pub struct Dropped {
@@ -102,9 +107,9 @@ impl Values {
                     number().filter(whole).ok_or_else(|| drop("no whole number"))?
                 }
                 ColumnKind::Number(_) if column.target == Id::Time as usize => {
-                    clock.or_else(number).ok_or_else(|| drop("neither a number nor a time of day"))?
+                    clock.or_else(number).ok_or_else(|| drop(NO_TIME))?
                 }
-                ColumnKind::Number(_) => number().ok_or_else(|| drop("no number"))?,
+                ColumnKind::Number(_) => number().ok_or_else(|| drop(NO_NUMBER))?,
             };
             values.numbers[column.target] = value;
         }

@@ -27,6 +27,7 @@ pub fn page() -> String {
         }
         choices(&mut page, kind, &schema);
     }
+    page.push_str(&defects());
     page.push_str(&targets());
     page
 }
@@ -162,6 +163,22 @@ fn named(kind: Kind, name: &str, object: &Map<String, Value>) -> String {
         },
         other => other.into(),
     }
+}
+
+fn defects() -> String {
+    let mut page = String::from(
+        "\n## defects\n\nWhat a `[[defect]]` of a defects file (`--defects FILE`) can be of the virtual rig: `name`, and `parameters` or a \
+         `seed` that draws them within the range.\n\n\
+         | name | where | parameters, with the range of a seed | what it is |\n|---|---|---|---|\n",
+    );
+    for kind in sim::defects::ALL {
+        let parameter = |p: &sim::defects::Parameter| format!("`{}` {} to {}", p.name, p.low, p.high);
+        let parameters: Vec<String> = kind.parameters.iter().map(parameter).collect();
+        let place = format!("{:?}", kind.place).to_lowercase();
+        let about = one_line(kind.summary);
+        let _ = writeln!(page, "| `{}` | {place} | {} | {about} |", kind.name, parameters.join("<br>"));
+    }
+    page
 }
 
 fn targets() -> String {

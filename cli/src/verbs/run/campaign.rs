@@ -26,8 +26,12 @@ pub fn run(mut args: Args, text: &str, folder: &Path, json: bool) -> miette::Res
             "--seed is that of one run; a campaign has its own"
         );
     }
-    let campaign = Campaign::parse(&args.plan, text, folder)?;
     let resumed = Path::new(&args.plan).is_dir().then(|| PathBuf::from(&args.plan));
+    let file = resumed
+        .as_ref()
+        .map_or_else(|| args.plan.clone(), |of| of.join(campaign::FILE).display().to_string());
+    let campaign =
+        Campaign::parse(&file, text, folder).map_err(|why| tables::check::refusal(why, &file, "campaign"))?;
     let out =
         args.out.take().or(resumed).unwrap_or_else(|| runs_folder().join(new_name(&campaign.file.name)));
     let given = args.clone();

@@ -2,9 +2,9 @@
 
 use super::prelude::*;
 
-/// Load on solid contact without air that fades by 1/e over one film thickness unit, N (physics.md 4.1).
+/// Load on solid contact without air that fades by 1/e over one film thickness unit, N.
 const SOLID_SCALE_N: f64 = 1.1;
-/// Apparent area times one atmosphere, N (34 mm2, physics.md section 2).
+/// Apparent area times one atmosphere, N (34 mm2).
 const AIR_SCALE_N: f64 = 3.4;
 
 /// Excursion of the plate over the mean gap beyond which the film's formula is not followed (its pole lies at one).

@@ -2,8 +2,7 @@
 
 use crate::report::html::{column, escape, table};
 use crate::report::human::number;
-use crate::verdict::plain;
-use diagnosis::next::Experiment;
+use diagnosis::next::{Experiment, words};
 use diagnosis::verdict::Diagnosis;
 use models::covariate::{self, Covariate};
 
@@ -21,7 +20,7 @@ pub fn section(result: &Diagnosis) -> String {
 }
 
 fn worth(e: &Experiment) -> String {
-    let [a, b] = [0, 1].map(|i| plain(&e.separates[i]));
+    let [a, b] = e.separates.each_ref().map(|name| words(name));
     if e.expected_nats > BEYOND {
         format!("If {a} is true, odds of more than a million to one against {b} are expected.")
     } else {
