@@ -123,6 +123,21 @@ fn an_exact_alias_is_never_named_for_being_less_of_a_surprise() {
     }
 }
 
+/// Ridges with a grain are stiffer in one direction; to the forces that is a stage that is faster in it. Neither is
+/// named beside the other.
+#[test]
+fn a_grain_of_the_ridges_is_not_named_as_a_speed() {
+    for &seed in &[29_116_087_348_036, 29_116_087_348_084, 29_116_087_348_073][..tests::rounds(1, 3)] {
+        let set = generate(seed, Stratum::Outside, Ask::Gain);
+        assert_eq!(set.label.causes[0].name, "ridge_anisotropy");
+        let scored = score(&set, &Options::default()).unwrap();
+        assert_eq!(scored.verdict, Verdict::Ambiguous, "seed {seed}: {:?}", scored.named);
+        let both =
+            ["speed_error", "stiffness_error"].iter().all(|c| scored.class.iter().any(|name| name == c));
+        assert!(both, "seed {seed}: {:?}", scored.class);
+    }
+}
+
 /// A gain that hides in a stiffness, beside another cause: the amplitude is half of what was asked, and the
 /// plate is tilted. The tilt alone explains every pass, with a stiffness twenty deviations from its
 /// calibration. The answer is two causes, with the aliases of both in the class.
@@ -144,6 +159,24 @@ fn friction_that_heats_up_is_not_named_as_rate_and_load() {
     for &seed in &[1_710_005_130_201, 1_710_005_130_512, 1_710_005_130_543][..tests::rounds(1, 3)] {
         let set = generate(seed, Stratum::Outside, Ask::Gain);
         assert_eq!(set.label.causes[0].name, "frictional_heating");
+        let scored = score(&set, &Options::default()).unwrap();
+        assert_eq!(scored.verdict, Verdict::Unknown, "seed {seed}: {:?}", scored.named);
+    }
+}
+
+/// An attraction by charge was named as an adhesion that is peeled faster, and ridges that resonate sideways
+/// as a plate off its resonance, while the open set had no form of either.
+#[test]
+fn charge_and_sideways_resonance_are_not_named_as_what_comes_near() {
+    let sets = [
+        (29_112_087_336_050, "triboelectric_attraction"),
+        (29_112_087_336_046, "lateral_resonance"),
+        (29_112_087_336_057, "triboelectric_attraction"),
+        (29_112_087_336_034, "lateral_resonance"),
+    ];
+    for (seed, cause) in &sets[..tests::rounds(2, 4)] {
+        let set = generate(*seed, Stratum::Outside, Ask::Gain);
+        assert_eq!(set.label.causes[0].name, *cause);
         let scored = score(&set, &Options::default()).unwrap();
         assert_eq!(scored.verdict, Verdict::Unknown, "seed {seed}: {:?}", scored.named);
     }

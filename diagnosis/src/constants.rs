@@ -201,15 +201,15 @@ constants! {
     same_forces_chi2: f64 = 4.0, "chi2 between the forces of two hypotheses below which they say the same of a table.", JUDGEMENT;
     prior_nats: f64 = 10.0, "Nats up to which such a hypothesis stays in the leader's class: priors alone make no name.", JUDGEMENT;
     claim_probability: f64 = 0.1, "Probability of no gap above which no gap is claimed.", "judgement: the complement of `name_probability`";
-    pair_gain_share: f64 = 0.03, "Share of the gap's chi2 by which a second cause must raise twice the log evidence.", "development: single causes under another form gained up to 0.026 by a spurious companion, on two generators";
+    pair_gain_share: f64 = 0.03, "First way for a pair to keep its weight: share of the gap's chi2 by which its second cause raises twice the log evidence, beside `pair_least_nats`.", "development: single causes under another form gained up to 0.026 by a spurious companion, on two generators";
     pair_folded: f64 = 0.95, "Share of its weight that goes to its members where it says little more than they; the rest stays.", "development: of 18 such pairs seven were true, where one set in three had a pair; what a name of the single needs is left";
-    pair_halves: f64 = 0.5, "Or: share of what the better single cause leaves, where that is a misfit, that the second cause takes up,", JUDGEMENT;
-    pair_nats: f64 = 50.0, "and raises the log evidence by these nats.", "development: spurious companions gained up to 34";
-    pair_complete_sd: f64 = 1.0, "Or: deviations of scatter within which it leaves nothing, where the better single cause leaves a misfit.", JUDGEMENT;
-    pair_least_nats: f64 = 20.0, "Nats that either of these must raise the log evidence by.", "development: of 21 spurious companions 12 gained less, of 29 true ones four";
+    pair_halves: f64 = 0.5, "Second way: of what the better single cause leaves as a misfit, the share below which the pair leaves, beside `pair_nats`.", JUDGEMENT;
+    pair_nats: f64 = 50.0, "Nats by which the second way raises the log evidence.", "development: spurious companions gained up to 34";
+    pair_complete_sd: f64 = 1.0, "Third way: deviations of scatter within which the pair leaves nothing where the better single cause leaves a misfit, beside `pair_least_nats`.", JUDGEMENT;
+    pair_least_nats: f64 = 20.0, "Nats by which the first and the third way raise the log evidence.", "development: of 21 spurious companions 12 gained less, of 29 true ones four";
+    pair_pull_chi2: f64 = 50.0, "Fourth way: chi2 by which the pair frees the nuisances.", "development: true single causes pull them by up to 30, a gain that hides in a stiffness by hundreds";
     pair_departure: f64 = 0.3, "Root mean square share of the gap up to which what a member of a pair leaves alone, with a smooth departure from its form, makes the pair untold from it.", "development: forms of one cause that pairs were named for left up to 0.29 of the gap";
     pair_own_form_nats: f64 = 30.0, "Evidence for a pair over a member alone from which the second cause is named all the same.", "development: of 128 single causes one had a pair in front, by 22 nats; of nine true pairs that the rule kept from a name seven had 30 to 700";
-    pair_pull_chi2: f64 = 50.0, "Or: chi2 by which it frees the nuisances.", "development: true single causes pull them by up to 30, a gain that hides in a stiffness by hundreds";
 
     }
     Report {

@@ -109,7 +109,7 @@ fn designed(fitted: &Fitted, table: &Table, rig: &RigFile, decision: &Decision) 
     );
     if grid.len() < all {
         text.push_str(&format!(
-            " Conditions that change the force by less than {:.2} mN are left out: the sensor hardly sees them.",
+            " Conditions that change the force by less than {:.2} mN are left out: the sensor does not resolve them.",
             1e3 * least_n
         ));
     }

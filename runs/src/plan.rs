@@ -182,7 +182,8 @@ pub struct Series {
     /// m.
     #[serde(skip_serializing_if = "Vec::is_empty")]
     pub position_m: Vec<f64>,
-    /// Pa: somebody sets it, a chamber or the operator; passes are grouped by the levels of the air.
+    /// Pa: somebody sets it, a chamber or the operator; passes are grouped by the levels of the air; one that the
+    /// list returns to is visited again.
     #[serde(skip_serializing_if = "Vec::is_empty")]
     pub ambient_pressure_pa: Vec<f64>,
     /// deg C: likewise.

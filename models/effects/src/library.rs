@@ -88,7 +88,9 @@ causes! {
     }
     // Causes of known form that no verdict names: the open set of a diagnosis takes them in.
     open_set {
+        charging
         frictional_heating
+        lateral_resonance
     }
 }
 

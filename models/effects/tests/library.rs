@@ -255,6 +255,11 @@ fn laws_change_what_they_state_by_their_formula() {
     let pass = Condition { normal_force_n: Condition::paper().normal_force_n * 1.7, ..moving(2.0) };
     let growing = force(&BASELINE, "stiffness_error", "both, growing with the load", &[1.0 / 3.0], &pass);
     same(growing, lateral_force(&stiffer, &[], &pass, &DESIGN));
+    for direction in [Direction::Forward, Direction::Backward] {
+        let pass = Condition { direction, ..moving(2.0) };
+        let faster = force(&BASELINE, "speed_error", "by direction", &[0.4], &pass);
+        same(faster, force(&BASELINE, "stiffness_error", "lateral stiffness by direction", &[0.4], &pass));
+    }
     for (argument, share) in [(2.404_826, 0.02), (3.831_706, 0.402_759), (0.0, 1.0)] {
         let position_m = 0.01 * argument / std::f64::consts::PI;
         let at = |um| Condition { position_m, frequency_hz: DESIGN.reference_frequency_hz, ..moving(um) };

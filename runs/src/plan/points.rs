@@ -61,8 +61,16 @@ fn quantise(wanted: f64, step: f64) -> f64 {
 #[error("{0}")]
 pub struct PlanProblem(String);
 
-/// A condition of a series, the directions in which it is visited in turn, and its edges.
-pub(super) type Visit<'a> = (Condition, &'a [i8], u32);
+/// A condition of a series, and how it is visited.
+#[derive(Clone, Copy)]
+pub(super) struct Visit<'a> {
+    pub(super) condition: Condition,
+    /// The directions, in turn.
+    directions: &'a [i8],
+    edges: u32,
+    /// How often the series left this state of the air before: 1 where a chamber has gone back to a pressure.
+    returns: u32,
+}
 
 impl Plan {
     /// The passes in the order of measurement.
@@ -106,22 +114,30 @@ impl Plan {
             ..c
         };
         // A series' own directions are settings like others; the plan's are visited in turn.
-        let visits = |c: Condition| -> Vec<Visit<'_>> {
+        let (mut left, mut here) = (Vec::new(), None);
+        let visits = |condition: Condition| -> Vec<Visit<'_>> {
+            let state = Ambient::of(&condition);
+            if here != Some(state) {
+                left.extend(here.replace(state));
+            }
+            let returns = left.iter().filter(|was| **was == state).count() as u32;
+            let visit = |directions| Visit { condition, directions, edges: series.edges, returns };
             match &series.directions[..] {
-                [] => vec![(c, &self.file.directions[..], series.edges)],
-                own => own.iter().map(|d| (c, std::slice::from_ref(d), series.edges)).collect(),
+                [] => vec![visit(&self.file.directions[..])],
+                own => own.iter().map(|d| visit(std::slice::from_ref(d))).collect(),
             }
         };
         conditions.into_iter().map(set).flat_map(visits).collect()
     }
 
-    /// Repeats, shuffles within each state of the air, interleaves references, and turns conditions into
-    /// passes.
+    /// Repeats, shuffles within each visit of a state of the air, interleaves references, and turns
+    /// conditions into passes.
     fn order<'a>(&'a self, conditions: &[Visit<'a>], seed: u64) -> Vec<Point> {
         let mut rng = ChaCha12Rng::seed_from_u64(seed);
-        let mut states: Vec<Ambient> = Vec::new();
-        for (c, ..) in conditions {
-            let state = Ambient::of(c);
+        let state_of = |v: &Visit<'_>| (Ambient::of(&v.condition), v.returns);
+        let mut states: Vec<(Ambient, u32)> = Vec::new();
+        for visit in conditions {
+            let state = state_of(visit);
             if !states.contains(&state) {
                 states.push(state);
             }
@@ -130,28 +146,31 @@ impl Plan {
         let sets = |s: &Ambient| {
             [s.ambient_pressure_pa, s.temperature_c, s.relative_humidity_pct].map(|v| v.is_some())
         };
-        states.sort_by_key(|state| sets(state).contains(&true));
+        states.sort_by_key(|(state, _)| sets(state).contains(&true));
         let mut points = Vec::new();
         for state in states {
-            let here = conditions.iter().filter(|(c, ..)| Ambient::of(c) == state);
+            let here = conditions.iter().filter(|v| state_of(v) == state);
+            let repeats = state.1 * self.file.replicates..(state.1 + 1) * self.file.replicates;
             let mut visits: Vec<(&Visit<'a>, u32)> =
-                here.flat_map(|c| (0..self.file.replicates).map(move |r| (c, r))).collect();
+                here.flat_map(|v| repeats.clone().map(move |r| (v, r))).collect();
             if self.file.randomise {
                 visits.shuffle(&mut rng);
             }
             let every = self.file.reference_every as usize;
             let mut references = 0;
-            let still = |(c, directions, _): &Visit<'a>| {
-                (Condition { amplitude: PeakToPeak::ZERO, ..*c }, *directions, 0)
+            let still = |v: &Visit<'a>| Visit {
+                condition: Condition { amplitude: PeakToPeak::ZERO, ..v.condition },
+                edges: 0,
+                ..*v
             };
             for (i, (here, replicate)) in visits.iter().enumerate() {
                 if every > 0 && i % every == 0 {
                     visit(&mut points, &still(here), references, true);
                     references += 1;
                 }
-                let reference = here.0.amplitude == PeakToPeak::ZERO;
-                let edges = if reference { 0 } else { here.2 };
-                visit(&mut points, &(here.0, here.1, edges), *replicate, reference);
+                let reference = here.condition.amplitude == PeakToPeak::ZERO;
+                let edges = if reference { 0 } else { here.edges };
+                visit(&mut points, &Visit { edges, ..**here }, *replicate, reference);
             }
             if let (true, Some((last, _))) = (every > 0, visits.last()) {
                 visit(&mut points, &still(last), references, true);
@@ -206,7 +225,7 @@ impl Plan {
 
     fn check_travel(&self, conditions: &[Visit<'_>], limits: &Limits) -> Result<(), BadInput> {
         let (left, right) = limits.travel_m;
-        for (c, _, edges) in conditions {
+        for Visit { condition: c, edges, .. } in conditions {
             let half = 0.5 * self.stroke_m(c.speed_m_s, *edges);
             if c.position_m - half < left || c.position_m + half > right {
                 let [speed, position, stroke, left, right] =
@@ -228,7 +247,7 @@ impl Plan {
 
 /// Makes the passes of one visit, in each of its directions.
 fn visit(points: &mut Vec<Point>, visit: &Visit<'_>, replicate: u32, reference: bool) {
-    let (condition, directions, edges) = *visit;
+    let Visit { condition, directions, edges, .. } = *visit;
     for sign in directions {
         let direction = Direction::try_from(*sign).expect("checked when the plan was read");
         let number = points.len() as u32;
@@ -299,5 +318,21 @@ mod tests {
         let plan = Plan::parse("p", &format!("{text}[[series]]\namplitude_pp_m = [3e-6]\n")).unwrap();
         let points = plan.points(1, &limits, &Resolution { amplitude_pp_m: 0.0, frequency_hz: 0.0 }).unwrap();
         assert!(points[..2].iter().all(|p| p.condition.ambient_pressure_pa.is_none()), "{points:?}");
+    }
+
+    /// A chamber that returns to a pressure shows whether the friction does too: the last level was measured
+    /// together with the first.
+    #[test]
+    fn a_pressure_that_a_series_returns_to_is_visited_again_at_its_place() {
+        let text = "name = \"p\"\nreference_every = 0\ndirections = [1]\nreplicates = 2\n[base]\namplitude_pp_m = 2e-6\n\
+                    frequency_hz = 27500\nspeed_m_s = 0.02\nnormal_force_n = 0.25\n[[series]]\n\
+                    ambient_pressure_pa = [101325, 50000, 101325]\n";
+        let plan = Plan::parse("p", text).unwrap();
+        let limits = Limits::paper(realtime::ports::Nanos(1_000_000));
+        let points = plan.points(1, &limits, &Resolution { amplitude_pp_m: 0.0, frequency_hz: 0.0 }).unwrap();
+        let visits: Vec<_> =
+            points.iter().map(|p| (p.condition.ambient_pressure_pa.unwrap(), p.replicate / 2)).collect();
+        let [first, low, last] = [(101_325.0, 0), (50_000.0, 0), (101_325.0, 1)];
+        assert_eq!(visits, [first, first, low, low, last, last]);
     }
 }

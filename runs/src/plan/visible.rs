@@ -68,15 +68,16 @@ impl Plan {
         let (least_n, because) = channel.least_change_n();
         for (index, series) in self.file.series.iter().enumerate() {
             let conditions = self.conditions_of(index, resolution);
-            let expected =
-                conditions.iter().filter_map(|(c, ..)| Some((c, expected_change_n(c, model, mu0)?)));
+            let expected = conditions
+                .iter()
+                .filter_map(|v| Some((v.condition, expected_change_n(&v.condition, model, mu0)?)));
             let Some((best, change_n)) = expected.max_by(|a, b| a.1.total_cmp(&b.1)) else { continue };
             if change_n >= least_n {
                 continue;
             }
             let number = points
                 .iter()
-                .find(|p| p.condition == Condition { direction: p.condition.direction, ..*best })
+                .find(|p| p.condition == Condition { direction: p.condition.direction, ..best })
                 .map_or(String::new(), |p| format!(" (point {})", p.number));
             let [w, f, u, n] = [
                 quantity(best.amplitude.metres(), "m"),

@@ -31,8 +31,6 @@ pub(super) static EFFECT: Effect = Effect {
             &[
                 Parameter::signed("log_gain", "1", 0.15, -1.0, 1.0),
                 Parameter::signed("growth_with_log_speed", "1", 0.1, -0.5, 0.5),
-                // A cable pulls one way.
-                Parameter::signed("growth_forward", "1", 0.3, -2.0, 2.0).bending(),
             ],
         )
         .seen_by(CHECK, 0.003),
@@ -47,6 +45,10 @@ pub(super) static EFFECT: Effect = Effect {
         )
         .needs(&[Need::Time])
         .seen_by(CHECK, 0.003),
+        // A cable pulls one way: as a lateral stiffness by direction does, prior and all.
+        Law::new("by direction", &[Parameter::signed("log_gain_forward", "1", 0.3, -2.0, 2.0)])
+            .needs(&[Need::Directions])
+            .seen_by(CHECK, 0.003),
     ],
     near: &["amplitude_miscalibration"],
     acts: Some(Acts { on: Input::Speed, over: &[&covariate::SPEED] }),
@@ -61,10 +63,10 @@ pub(super) static EFFECT: Effect = Effect {
             let time = pass.elapsed_s(theta[2]) / (theta[1] * design.duration_s.max(1e-9));
             c.speed *= (theta[0] * (-time).exp()).exp();
         }
+        4 => c.speed *= (theta[0] * pass.direction.sign()).exp(),
         _ => {
             let faster = (c.speed / design.reference_speed_m_s).ln();
-            let growth = 1.0 + theta[1] * faster + theta[2] * pass.direction.sign();
-            c.speed *= (theta[0] * growth).exp();
+            c.speed *= (theta[0] * (1.0 + theta[1] * faster)).exp();
         }
     },
     ..Effect::NONE
