@@ -9,6 +9,7 @@
 
 pub mod asperities;
 mod bonds;
+pub mod distorted;
 pub(crate) mod gap;
 mod held;
 pub mod impact;
@@ -77,6 +78,8 @@ pub struct Contact {
     /// Damping in proportion to the indentation (Hunt and Crossley), s/m: the normal force rises by this
     /// times the speed of indentation, and no more than twofold. 0 in the baseline.
     pub indentation_damping: f64,
+    /// Second harmonic of the plate's motion; with it only springs and Coulomb friction act.
+    pub harmonic: distorted::Harmonic,
     /// Mass of the ridges that follow the plate, kg. 0 in the baseline.
     pub mass: f64,
     /// Share of the ridges without mass. 0 in the baseline.
@@ -162,6 +165,8 @@ pub fn mean_friction(c: &Contact) -> f64 {
         still_friction(c)
     } else if c.asperity_height > 0.0 {
         asperities::mean_friction(c)
+    } else if c.harmonic.ratio > 0.0 {
+        distorted::mean_friction(c)
     } else if c.needs_sweep() {
         sweep::mean_friction(c)
     } else {

@@ -91,6 +91,7 @@ causes! {
         charging
         frictional_heating
         lateral_resonance
+        second_harmonic
     }
 }
 

@@ -1,5 +1,6 @@
 //! The baseline's parameters, what the whole design says about scales, and what a reading is.
 
+use crate::contact::distorted::Harmonic;
 use crate::contact::{Bonds, Contact, Held};
 use models::condition::Condition;
 
@@ -86,6 +87,7 @@ impl Baseline {
             asperity_heights: crate::contact::asperities::Heights::Gaussian,
             normal_retardation_time: 0.0,
             indentation_damping: 0.0,
+            harmonic: Harmonic { ratio: 0.0, phase: 0.0 },
             mass: 0.0,
             massless_share: 0.0,
             ridge_damping_ratio: 1.0,
