@@ -8,7 +8,7 @@ use rayon::prelude::*;
 use sim::sealed::{Ask, Stratum, generate};
 use std::collections::BTreeSet;
 use studies::validation::blind::distance::distance;
-use studies::validation::blind::score;
+use studies::validation::blind::{median, score, statistic};
 
 fn rig_of(text: &str) -> RigFile {
     toml::from_str(text).expect("rig.toml of a sealed set")
@@ -16,6 +16,14 @@ fn rig_of(text: &str) -> RigFile {
 
 fn quick() -> Options {
     Options { pairs: false, ..Options::default() }
+}
+
+/// The bootstrap of one value was an interval of no width: certainty.
+#[test]
+fn one_value_has_no_interval() {
+    let of = |values: &[f64]| statistic("x", "", values, median);
+    assert_eq!((of(&[0.7]).value, of(&[0.7]).ci95), (Some(0.7), None));
+    assert!(of(&[0.7, 0.8]).ci95.is_some_and(|[low, high]| low < high));
 }
 
 /// No gap: nothing is named.

@@ -2,12 +2,12 @@
 
 use models::prediction::SpringSlider;
 use rayon::prelude::*;
-use runs::campaign::claims::{Answer, Claim, Trend, claims, trend};
 use runs::campaign::{self, Campaign};
 use runs::session::{Job, Signals};
 use std::collections::BTreeMap;
 use std::path::Path;
 use std::sync::Arc;
+use studies::campaign::claims::{Answer, Claim, Trend, claims, trend};
 use tests::muprime;
 
 /// The bundled campaign on a rig that is the spring-slider, with a seed and blocks of its own.
@@ -42,7 +42,7 @@ fn answers(campaign: &Campaign, defects: &str) -> Vec<Claim> {
         };
         job.run_in_virtual_time(&Signals::default(), &mut |_| {}).unwrap();
     }
-    let (file, made) = campaign::measured(folder.path()).unwrap();
+    let (file, made) = studies::campaign::measured(folder.path()).unwrap();
     assert_eq!(made.len(), campaign::sessions(&file).len());
     claims(&made, file.margin)
 }
@@ -166,6 +166,45 @@ fn a_campaign_is_taken_up_where_it_was_left() {
     let last: serde_json::Value = serde_json::from_str(out.lines().last().unwrap()).unwrap();
     let all = last["campaign"]["claims"].as_array().unwrap();
     assert!(all.iter().all(|claim| answer(claim) == "undecided"), "{last}");
+}
+
+/// A campaign with files of its own goes on by its folder, and not with a plan, setup or tip that was
+/// changed meanwhile.
+#[test]
+fn a_campaign_goes_on_with_the_files_that_it_began_with() {
+    let folder = tempfile::tempdir().unwrap();
+    let at = |name: &str| folder.path().join(name);
+    tests::short_plan(folder.path());
+    std::fs::write(at("own.toml"), tests::setup("virtual-ideal").text).unwrap();
+    std::fs::write(at("tip.toml"), runs::fingertip::BUNDLED[0].1).unwrap();
+    let cell =
+        |name: &str| format!("[[cell]]\nname = \"{name}\"\nsetup = \"own.toml\"\ntip = \"tip.toml\"\n");
+    let text = format!("name = \"own\"\nplan = \"short.toml\"\nblocks = 1\n{}{}", cell("a"), cell("b"));
+    std::fs::write(at("own-campaign.toml"), text).unwrap();
+    let run = |what: &[&str]| {
+        let out = muprime().current_dir(folder.path()).args(what).output().unwrap();
+        (out.status.code(), String::from_utf8(out.stderr).unwrap())
+    };
+    let (status, told) = run(&["run", "own-campaign.toml", "--fast", "--out", "deep/made"]);
+    assert_eq!(status, Some(0), "{told}");
+    let first = std::fs::read_dir(at("deep/made/sessions")).unwrap().next().unwrap().unwrap().path();
+    std::fs::remove_dir_all(&first).unwrap();
+    for (what, from, to) in [
+        ("short.toml", "settle_s = 0.08", "settle_s = 0.09"),
+        ("own.toml", "name = \"virtual-ideal\"", "name = \"another\""),
+        ("tip.toml", "mu0 = 0.", "mu0 = 0.1"),
+    ] {
+        let was = std::fs::read_to_string(at(what)).unwrap();
+        assert!(was.contains(from), "{what}: {was}");
+        std::fs::write(at(what), was.replacen(from, to, 1)).unwrap();
+        let (status, told) = run(&["run", "deep/made", "--fast"]);
+        let told = told.split_whitespace().filter(|word| *word != "│").collect::<Vec<_>>().join(" ");
+        assert!(status == Some(2) && told.contains(what) && told.contains("changed after session"), "{told}");
+        assert!(!first.exists());
+        std::fs::write(at(what), was).unwrap();
+    }
+    let (status, told) = run(&["run", "deep/made", "--fast"]);
+    assert!(status == Some(0) && told.contains("2 of 2 sessions"), "{told}");
 }
 
 /// What a campaign cannot be is refused with its place, and nothing is made.

@@ -276,6 +276,60 @@ fn damaged_records_are_refused_and_whole_ones_are_known() {
     }
 }
 
+/// What the program writes itself is known by what it is, and a part of a run that is damaged by its name.
+#[test]
+fn files_of_the_program_are_known() {
+    let made = Made::new();
+    let run = made.at("run");
+    for format in ["mcap", "arrow", "hdf5"] {
+        assert!(muprime().args(["export", "--to", format]).arg(&run).output().unwrap().status.success());
+    }
+    std::fs::write(run.join("annotations.toml"), "tags = [\"dry\"]\nnote = \"\"\n").unwrap();
+    std::fs::write(made.at("tips.json"), "[\"artificial\",\"human\"]").unwrap();
+    std::fs::write(made.at("claims.json"), "[{\"statement\":\"friction falls\"}]").unwrap();
+    std::fs::write(made.at("study.json"), "{\"schema\":\"muprime.study/1\"}").unwrap();
+    let fidelity = "{\"schema\":\"muprime.fidelity/1\",\"tolerance\":0.05,\"remarks\":[],\"groups\":[]}";
+    std::fs::write(made.at("fidelity.json"), fidelity).unwrap();
+    let cases = made.at("cases.jsonl");
+    let noop = muprime().args(["cases", "noop", "--cases", "3", "-o"]).arg(&cases).output().unwrap();
+    assert!(noop.status.success());
+    std::fs::create_dir(made.at("camp")).unwrap();
+    std::fs::write(made.at("camp/campaign.toml"), "").unwrap();
+    for (file, kind) in [
+        ("run/signals.mcap", "signals of an export"),
+        ("run/passes.arrow", "Arrow export"),
+        ("run/passes.h5", "HDF5 export"),
+        ("run/annotations.toml", "annotations"),
+        ("tips.json", "tips of a campaign"),
+        ("claims.json", "claims of a campaign"),
+        ("study.json", "study"),
+        ("fidelity.json", "fidelity"),
+        ("cases.jsonl", "file of cases"),
+        ("camp", "campaign folder"),
+    ] {
+        let (code, said) = checked(&[], &made.at(file));
+        assert_eq!((code, said["kind"].as_str()), (Some(0), Some(kind)), "{said}");
+    }
+    let signals = std::fs::read(run.join("signals.mcap")).unwrap();
+    std::fs::write(run.join("signals.mcap"), &signals[..signals.len() - 1]).unwrap();
+    let (code, said) = checked(&[], &run.join("signals.mcap"));
+    assert!(code == Some(2) && said.to_string().contains("cut"), "{said}");
+    // A file of another kind than is needed is named with its article.
+    let output = muprime().args(["run", "--fast", "--setup", "virtual"]).arg(run.join("run.toml")).output();
+    let said = texts(&output.unwrap()).1;
+    assert!(said.contains("is the run.toml of a run"), "{said}");
+    std::fs::write(run.join("summary.json"), "{\"planned\": 3}").unwrap();
+    std::fs::rename(&run, made.at("camp/sessions")).unwrap();
+    std::fs::create_dir(made.at("camp/s")).unwrap();
+    std::fs::rename(made.at("camp/sessions"), made.at("camp/s/01-a")).unwrap();
+    std::fs::rename(made.at("camp/s"), made.at("camp/sessions")).unwrap();
+    let (code, said) = checked(&[], &made.at("camp/sessions/01-a"));
+    assert!(code == Some(2) && said["problem"].as_str().unwrap().contains("summary.json: "), "{said}");
+    assert!(said["help"].as_str().unwrap().contains("writes summary.json again"), "{said}");
+    let (code, said) = checked(&[], &made.at("camp"));
+    assert!(code == Some(2) && said.to_string().contains("its runs are in sessions/"), "{said}");
+}
+
 /// Every problem of a file at once, each with its own line.
 #[test]
 fn all_problems_are_told_at_once() {

@@ -287,6 +287,127 @@ fn one_flipped_bit_is_told_by_replay_report_recover_and_diagnose() {
     assert!(ask(&["report"], &out).1["damage"].to_string().contains("points.csv and passes.jsonl differ"));
 }
 
+/// A table that is cut, empty or gone: everybody is told, and the same command puts every pass back and
+/// drives none.
+#[test]
+fn a_table_that_lost_passes_is_told_and_written_again_from_the_journal() {
+    let folder = tempfile::tempdir().unwrap();
+    let (plan, out) = (plan(folder.path(), 2), folder.path().join("run"));
+    assert_eq!(sweep(&plan, &out).arg("--fast").output().unwrap().status.code(), Some(0));
+    let (table, record) = (out.join("points.csv"), out.join("run-1.mcap"));
+    let whole = std::fs::read_to_string(&table).unwrap();
+    let lines: Vec<&str> = whole.split_inclusive('\n').collect();
+    let lost = format!("{} passes of passes.jsonl are not in points.csv", lines.len() - 3);
+    let ask = |words: &[&str]| muprime().arg("--json").args(words).arg(&out).output().unwrap();
+    for left in [lines[..3].concat(), lines[0][..9].to_string(), String::new()] {
+        std::fs::write(&table, &left).unwrap();
+        if !left.is_empty() && left.len() > lines[0].len() {
+            for words in [&["report"][..], &["export", "--to", "csv"]] {
+                assert!(documents(&ask(words))[0]["damage"].to_string().contains(&lost), "{words:?}");
+            }
+            let checked = ask(&["check", "--offline"]);
+            let said = documents(&checked).remove(0);
+            assert_eq!(checked.status.code(), Some(2), "{said}");
+            assert_eq!(said["problem"].as_str().unwrap().matches(&lost).count(), 1, "{said}");
+            assert!(said["help"].as_str().unwrap().contains("repeat the command"), "{said}");
+        }
+        if left.is_empty() {
+            std::fs::remove_file(&table).unwrap();
+            let said = texts(&ask(&["report"])).1;
+            assert!(said.contains("points.csv is missing") && said.contains("repeat the command"), "{said}");
+            assert!(!said.contains("holds no run"), "{said}");
+        }
+        let again = sweep(&plan, &out).output().unwrap();
+        assert_eq!(again.status.code(), Some(0), "{}", texts(&again).1);
+        assert!(!documents(&again).iter().any(|d| d["event"]["event"] == "armed"), "nothing is driven again");
+        assert!(
+            texts(&again).1.contains("of passes.jsonl were not in points.csv and are put back"),
+            "{}",
+            texts(&again).1
+        );
+        assert_eq!(std::fs::read_to_string(&table).unwrap(), whole);
+        assert!(record.exists() && !out.join("run-2.mcap").exists());
+    }
+    // The other way round nobody knows which of the two holds.
+    let journal = std::fs::read_to_string(out.join("passes.jsonl")).unwrap();
+    std::fs::write(out.join("passes.jsonl"), journal.split_inclusive('\n').take(2).collect::<String>())
+        .unwrap();
+    let refused = sweep(&plan, &out).output().unwrap();
+    let said = texts(&refused).1;
+    assert_eq!(refused.status.code(), Some(2), "{said}");
+    assert!(
+        said.contains("points.csv") && said.contains("passes.jsonl") && said.contains("a copy"),
+        "{said}"
+    );
+    assert_eq!(std::fs::read_to_string(&table).unwrap(), whole);
+}
+
+/// What a run is of belongs to all of its passes: a session with another operator or sample is refused.
+#[test]
+fn another_sample_or_operator_does_not_take_over_a_run() {
+    let folder = tempfile::tempdir().unwrap();
+    let (plan, out) = (plan(folder.path(), 1), folder.path().join("run"));
+    let with = |words: &[&str]| sweep(&plan, &out).arg("--fast").args(words).output().unwrap();
+    let told = texts(&with(&["--licence", "free for all"])).1;
+    assert!(told.contains("SPDX") && !out.exists(), "{told}");
+    let first = with(&["--operator", "Ada", "--sample", "tip 3"]);
+    assert_eq!(first.status.code(), Some(0), "{}", texts(&first).1);
+    let before = std::fs::read(out.join("run.toml")).unwrap();
+    for (option, other, was) in [("--operator", "Bob", "Ada"), ("--sample", "tip 4", "tip 3")] {
+        let refused = with(&[option, other]);
+        let said = texts(&refused).1;
+        assert_eq!(refused.status.code(), Some(2), "{said}");
+        assert!(said.contains(other) && said.contains(was) && said.contains("--out"), "{said}");
+    }
+    assert_eq!(with(&["--sample", "tip 3"]).status.code(), Some(0));
+    assert_eq!(std::fs::read(out.join("run.toml")).unwrap(), before);
+}
+
+/// A name that belongs to another file, or to another output: refused before any work, and nothing is
+/// replaced.
+#[test]
+fn no_output_takes_the_place_of_a_file_of_another_kind() {
+    let folder = tempfile::tempdir().unwrap();
+    let (plan, out) = (plan(folder.path(), 6), folder.path().join("run"));
+    assert_eq!(sweep(&plan, &out).arg("--fast").output().unwrap().status.code(), Some(0));
+    let script = folder.path().join("analysis.py");
+    std::fs::write(&script, "import muprime\n").unwrap();
+    let (mine, run) = (script.to_str().unwrap(), out.to_str().unwrap());
+    let record = out.join("run-1.mcap");
+    let before = std::fs::read(&record).unwrap();
+    let refused = |words: &[&str], because: &str| {
+        let output = muprime().args(words).current_dir(folder.path()).output().unwrap();
+        let said = texts(&output).1;
+        assert!(output.status.code() == Some(2) && said.contains(because), "{words:?}: {said}");
+        assert_eq!(std::fs::read_to_string(&script).unwrap(), "import muprime\n", "{words:?}");
+        assert!(std::fs::read(&record).unwrap() == before, "{words:?}");
+    };
+    for format in ["csv", "mcap"] {
+        refused(&["export", run, "--to", format, "--out", mine], "did not write it");
+        refused(&["export", run, "--to", format, "--out", record.to_str().unwrap()], "session's record");
+    }
+    refused(&["report", run, "--out", record.to_str().unwrap()], "session's record");
+    refused(&["cases", "noop", "--cases", "3", "--hashes", "0", "-o", mine], "did not write it");
+    refused(&["blind", "--sets", "1", "--write", mine], "not an empty folder");
+    refused(&["blind", "--sets", "1", "--write", run], "not an empty folder");
+    refused(&["diagnose", run, "--save-plan", mine], "did not write it");
+    refused(&["diagnose", run, "--save-model", "x", "--report", "./x"], "place of --save-model");
+    refused(&["blind", "--sets", "0"], "0 is not in");
+    refused(&["faults", "--seeds", "0"], "0 is not in");
+    // Its own earlier output is replaced.
+    for words in [&["export", run, "--to", "mcap"][..], &["cases", "noop", "--cases", "3", "-o", "c.jsonl"]] {
+        for _ in 0..2 {
+            let output = muprime().args(words).current_dir(folder.path()).output().unwrap();
+            assert_eq!(output.status.code(), Some(0), "{words:?}: {}", texts(&output).1);
+        }
+    }
+    // Of a record that is cut, the export holds fewer passes than the run, and says so.
+    std::fs::write(&record, &before[..before.len() / 2]).unwrap();
+    let output = muprime().args(["--json", "export", run, "--to", "mcap"]).output().unwrap();
+    let held = documents(&output)[0]["passes"].as_u64().unwrap() as usize;
+    assert!(held > 0 && held < points(&out).len(), "{held} of {}", points(&out).len());
+}
+
 #[test]
 fn a_reader_that_goes_away_ends_nothing() {
     let folder = tempfile::tempdir().unwrap();

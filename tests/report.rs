@@ -19,6 +19,37 @@ fn run(folder: &Path, setup: &str) -> std::path::PathBuf {
     out
 }
 
+/// Without a pass that is not vibrated mu_0 is the model's: 'measured' mu' rested on the model and nothing
+/// said so. Two such runs cannot be compared; which of two it is was not said either.
+#[test]
+fn a_run_without_references_says_that_its_mu_rests_on_the_model() {
+    let folder = tempfile::tempdir().unwrap();
+    let with = run(folder.path(), "virtual-ideal");
+    let plan = folder.path().join("bare.toml");
+    let text = std::fs::read_to_string(short_plan(folder.path())).unwrap();
+    let vibrated = text.lines().filter(|line| !line.starts_with("reference_every"));
+    let bare =
+        vibrated.collect::<Vec<_>>().join("\n").replace("amplitude_pp_m = [0.0, ", "amplitude_pp_m = [");
+    std::fs::write(&plan, format!("reference_every = 0\n{bare}\n")).unwrap();
+    let out = folder.path().join("bare");
+    let ran = |out: &Path| {
+        let run = ["run", plan.to_str().unwrap(), "--fast", "--setup", "virtual-ideal", "--out"];
+        muprime().args(run).arg(out).output().unwrap()
+    };
+    let remark = "no pass without vibration: mu_0 is that of the model";
+    let said = texts(&ran(&out));
+    assert!(said.1.split_whitespace().collect::<Vec<_>>().join(" ").contains(remark), "{}", said.1);
+    for (run, remarked) in [(&out, true), (&with, false)] {
+        for file in ["summary.json", "report.html"] {
+            let text = std::fs::read_to_string(run.join(file)).unwrap();
+            assert_eq!(text.contains(remark), remarked, "{}", run.join(file).display());
+        }
+    }
+    let compared = muprime().arg("compare").args([&with, &out]).output().unwrap();
+    let why = texts(&compared).1;
+    assert!(why.contains("bare: no pass") && !why.contains("short"), "{why}");
+}
+
 /// What stands between two texts, each time.
 fn between<'a>(text: &'a str, from: &str, to: &str) -> Vec<&'a str> {
     text.split(from).skip(1).filter_map(|rest| rest.split_once(to).map(|(found, _)| found)).collect()

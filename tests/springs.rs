@@ -116,6 +116,11 @@ fn calibrate_finger_states_the_ratio() {
     let (low, high) = (ratio["ci95"][0].as_f64().unwrap(), ratio["ci95"][1].as_f64().unwrap());
     // The virtual fingertip is drawn within 5 % of 1.5 / 3.9.
     assert!(low < high && (0.25..0.6).contains(&low) && (0.25..0.6).contains(&high), "{said}");
+    // Air under the finger, which the slider lacks: its stiffnesses were certified with a chi-square of 52.
+    assert!(run("run first-sweep --setup virtual --fast --out air").status.success());
+    let told = run("calibrate finger --passes air/points.csv --serial F-1 --operator O --out h.toml");
+    assert!(told.status.code() == Some(2) && !at.join("h.toml").exists(), "{}", texts(&told).1);
+    assert!(texts(&told).1.contains("does not explain"), "{}", texts(&told).1);
     let table = std::fs::read_to_string(at.join("swept/points.csv")).unwrap();
     let few: Vec<&str> = table.lines().take(4).collect();
     std::fs::write(at.join("few.csv"), few.join("\n") + "\n").unwrap();

@@ -42,6 +42,13 @@ pub enum FingerError {
          quadrature (a quarter period ahead of the displacement is positive) and the delay between the channels"
     )]
     NegativeLoss,
+    /// Passes that the spring-slider does not explain.
+    #[error(
+        "the spring-slider does not explain the {passes} passes: chi-square {reduced_chi2:.1} a degree of freedom (p < \
+         0.001), so its stiffnesses would be those of a law that does not hold; run `muprime diagnose` on the run first and \
+         use passes where the model holds, or state what the rig repeats to (--pass-relative-sd, --pass-force-sd-n)"
+    )]
+    Misfit { reduced_chi2: f64, passes: usize },
     /// The regression failed.
     #[error(transparent)]
     Fit(#[from] FitError),

@@ -44,6 +44,14 @@ fn a_speed_by_direction_is_not_named_before_a_stiffness_by_direction() {
     assert_eq!(lead, ["speed_error", "stiffness_error"]);
 }
 
+/// Skin with a grain whose springs are both wrong (fifth_generator.py, `--seed 51112902`, set 192): a
+/// stiffness and a speed by direction at 0.99, while no law of the stiffness was of the direction beside
+/// the rest.
+#[test]
+fn a_grain_beside_wrong_springs_is_one_cause() {
+    named(&["stiffness_error.grain"]);
+}
+
 /// A stiffness that follows the pad's angle along the plate (sixth_generator.py, `--seed 61112801`, set 114)
 /// was a pair with a standing wave; a zero tared before each run (fifth_generator.py, `--seed 51112902`, set
 /// 58) was ambiguous. Sizes were no functions of the place then, and functions of time no others in each run.

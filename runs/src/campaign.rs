@@ -8,15 +8,11 @@
 //! ```
 //! A block is a day or half of one: what drifts from day to day is then the same for all cells of it.
 
-pub mod claims;
-pub mod measured;
-mod page;
+mod origin;
 
-use crate::fingertip::FingertipKind;
 use crate::input::{self, Problems};
 use crate::plan::Plan;
 use crate::setup::Setup;
-use measured::Measured;
 use miette::IntoDiagnostic;
 use rand::SeedableRng;
 use rand::seq::SliceRandom;
@@ -25,14 +21,12 @@ use serde::{Deserialize, Serialize};
 use std::collections::BTreeSet;
 use std::path::{Path, PathBuf};
 
-pub use page::page;
-
 /// Name and text of every bundled campaign. Add one: a file in `runs/campaigns/` and a line here.
 pub const BUNDLED: &[(&str, &str)] = &[("part2-campaign", include_str!("../campaigns/part2-campaign.toml"))];
 /// The campaign's file in its folder.
 pub const FILE: &str = "campaign.toml";
 /// What kind of tip each cell has, beside it: a folder that was copied has no setups.
-const KINDS: &str = "tips.json";
+pub const KINDS: &str = "tips.json";
 /// Sessions that one campaign may have.
 const SESSIONS_MAX: usize = 1000;
 
@@ -95,6 +89,8 @@ pub struct Campaign {
     pub plan: Plan,
     /// The setup of each cell.
     pub setups: Vec<Setup>,
+    /// The folder that its paths are relative to.
+    pub folder: PathBuf,
 }
 
 /// One session: a cell in a block.
@@ -113,16 +109,16 @@ pub struct Session {
 }
 
 /// The text of a campaign and the folder that its paths are relative to; `None` where the name is that of a
-/// plan.
+/// plan. A folder of results names the one where its campaign was begun.
 ///
 /// # Errors
-/// A file that cannot be read.
+/// A file that cannot be read; results whose campaign's folder is gone.
 pub fn text_of(name_or_path: &str) -> miette::Result<Option<(String, PathBuf)>> {
     if let Some((_, text)) = BUNDLED.iter().find(|(name, _)| *name == name_or_path) {
         return Ok(Some(((*text).to_string(), PathBuf::from("."))));
     }
-    let path = Path::new(name_or_path);
-    let path = if path.is_dir() { path.join(FILE) } else { path.to_path_buf() };
+    let named = Path::new(name_or_path);
+    let path = if named.is_dir() { named.join(FILE) } else { named.to_path_buf() };
     if !path.is_file() {
         return Ok(None);
     }
@@ -130,8 +126,14 @@ pub fn text_of(name_or_path: &str) -> miette::Result<Option<(String, PathBuf)>> 
     // A file that is not TOML at all is refused as a plan, with its place.
     let is = toml::from_str::<toml::Table>(&text)
         .is_ok_and(|t| t.contains_key("cell") || t.contains_key("blocks"));
+    if !is {
+        return Ok(None);
+    }
+    if named.is_dir() {
+        return Ok(Some((text, origin::of_folder(named)?)));
+    }
     let folder = path.parent().filter(|p| !p.as_os_str().is_empty()).unwrap_or(Path::new("."));
-    Ok(is.then(|| (text, folder.to_path_buf())))
+    Ok(Some((text, folder.to_path_buf())))
 }
 
 impl Campaign {
@@ -181,13 +183,14 @@ impl Campaign {
             some => Plan::parse(&plan.origin, &edited(&plan.text, &[], some)?)?,
         };
         let setups = file.cell.iter().map(|cell| cell.setup(folder)).collect::<miette::Result<_>>()?;
-        Ok(Campaign { file, text: text.to_string(), plan, setups })
+        Ok(Campaign { file, text: text.to_string(), plan, setups, folder: folder.to_path_buf() })
     }
 
     /// Makes the campaign's folder, or takes up that of the same campaign.
     ///
     /// # Errors
-    /// A folder of another campaign, or one that cannot be written.
+    /// A folder of another campaign; a plan, setup or tip that was changed after a session was made with
+    /// it, or one that cannot be written.
     pub fn open(&self, folder: &Path) -> miette::Result<()> {
         let stored = folder.join(FILE);
         if stored.exists() {
@@ -197,10 +200,12 @@ impl Campaign {
                 "{} holds another campaign than this one",
                 folder.display()
             );
-            return Ok(());
+            return self.unchanged(folder);
         }
         crate::files::make_folder(&folder.join("sessions"))?;
-        let kinds: Vec<FingertipKind> = self.setups.iter().map(|setup| setup.tip.kind).collect();
+        self.store_origin(folder)?;
+        let kinds: Vec<crate::fingertip::FingertipKind> =
+            self.setups.iter().map(|setup| setup.tip.kind).collect();
         crate::files::write_plain(&folder.join(KINDS), serde_json::json!(kinds).to_string())?;
         crate::files::write_plain(&stored, &self.text)
     }
@@ -270,30 +275,4 @@ pub fn is_complete(run: &Path) -> bool {
     let summary = std::fs::read(run.join("summary.json")).ok();
     let summary = summary.and_then(|bytes| serde_json::from_slice::<crate::session::Summary>(&bytes).ok());
     summary.is_some_and(|summary| summary.outcome == crate::sequence::Outcome::Complete)
-}
-
-/// What was measured of a campaign: the sessions that are complete.
-///
-/// # Errors
-/// A folder without a campaign, a session whose files cannot be read.
-pub fn measured(folder: &Path) -> miette::Result<(CampaignFile, Vec<Measured>)> {
-    let path = folder.join(FILE);
-    let file: CampaignFile = input::parse_toml(&path.display().to_string(), &input::text_of(&path)?)?;
-    let kinds: Vec<FingertipKind> =
-        serde_json::from_str(&input::text_of(&folder.join(KINDS))?).into_diagnostic()?;
-    miette::ensure!(
-        kinds.len() == file.cell.len(),
-        "{}: {KINDS} belongs to another campaign",
-        folder.display()
-    );
-    let mut all = Vec::new();
-    for session in sessions(&file) {
-        let run = folder.join(&session.folder);
-        if is_complete(&run) {
-            let rig = input::rig_file(&run.join("rig.toml"))?;
-            let kind = kinds[session.cell];
-            all.push(Measured::new(session, kind, rig.finger, &crate::run_dir::passes_in(&run)?));
-        }
-    }
-    Ok((file, all))
 }

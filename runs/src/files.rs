@@ -2,7 +2,10 @@
 //! because a name too is only safe once its folder is (POSIX `fsync`; ext4, XFS and Btrfs give more, none
 //! promises it). Errors are those of the file system, where no others are stated.
 
+mod outputs;
+
 use miette::{Context, IntoDiagnostic};
+pub use outputs::{FLAT_MCAP, GATHERED, MODEL, NEXT_PLAN, PAGE, PREDICTIONS, replaceable, write_output};
 use std::fs::{self, File, OpenOptions};
 use std::io::{self, Read, Seek, SeekFrom, Write};
 use std::os::unix::fs::{MetadataExt, OpenOptionsExt};
@@ -66,43 +69,6 @@ pub fn write_whole(path: &Path, bytes: impl AsRef<[u8]>) -> miette::Result<()> {
         put(&path, bytes.as_ref())
     });
     written.into_diagnostic().wrap_err_with(|| format!("cannot write {}", path.display()))
-}
-
-/// Writes a file that a person named as an output, as [`write_whole`] does, unless another program's is there.
-///
-/// # Errors
-/// As [`write_whole`] and [`replaceable`].
-pub fn write_output(path: &Path, bytes: impl AsRef<[u8]>) -> miette::Result<()> {
-    replaceable(path, bytes.as_ref())?;
-    write_whole(path, bytes)
-}
-
-/// Bytes of an earlier file in which its origin is looked for.
-const HEAD: usize = 4096;
-
-/// Whether an output may take the place of what has that name: nothing, an empty file, or an earlier output,
-/// which begins as the new one does (its first column, or the mark of a binary format) or names this program.
-/// A person who mixes up two names loses no data.
-///
-/// # Errors
-/// Another file is there.
-pub fn replaceable(path: &Path, output: &[u8]) -> miette::Result<()> {
-    let mut head = Vec::new();
-    let plain = fs::metadata(path).is_ok_and(|there| there.is_file());
-    if !plain || File::open(path).and_then(|f| f.take(HEAD as u64).read_to_end(&mut head)).is_err() {
-        return Ok(());
-    }
-    let text = !matches!(output.first(), Some(b'<' | b'{' | b'#'));
-    let begins = output.iter().position(|b| b",;\t\n".contains(b)).unwrap_or(output.len()).min(6);
-    let alike = text && begins > 2 && head.starts_with(&output[..begins]);
-    if head.is_empty() || alike || head.windows(7).any(|word| word.eq_ignore_ascii_case(b"muprime")) {
-        return Ok(());
-    }
-    miette::bail!(
-        help = "give a name that is free, or remove the file",
-        "{} exists, and muprime did not write it: nothing was replaced",
-        path.display()
-    )
 }
 
 /// Writes a file of a run's or a study's folder, to which others may write, in the same way; a link that
@@ -281,28 +247,6 @@ mod tests {
         assert_eq!(names, ["link", "report.html", "taken"]);
         write_whole(Path::new("/dev/null"), b"a device stays one").unwrap();
         assert!(!fs::metadata("/dev/null").unwrap().is_file());
-        fs::remove_dir_all(folder).unwrap();
-    }
-
-    /// A table and notes of a person stay, an earlier output is replaced.
-    #[test]
-    fn an_output_replaces_only_outputs() {
-        let folder = folder("outputs");
-        let path = folder.join("mine");
-        let model = b"schema = \"muprime.model/1\"\n".as_slice();
-        for (there, output, replaced) in [
-            ("amplitude,force\n1,2\n", model, false),
-            ("# my notes\n", b"# a plan\n", false),
-            ("point,amplitude\n1,2\n", b"point,speed\n1,2\n", true),
-            ("<!doctype html><p>my page", b"<!doctype html>", false),
-            ("<!doctype html><meta name=generator content=muprime>", b"<!doctype html>", true),
-            ("", model, true),
-        ] {
-            fs::write(&path, there).unwrap();
-            let written = write_output(&path, output);
-            assert_eq!(written.is_ok(), replaced, "{there}");
-            assert_eq!(fs::read(&path).unwrap(), if replaced { output } else { there.as_bytes() });
-        }
         fs::remove_dir_all(folder).unwrap();
     }
 

@@ -1,7 +1,9 @@
 //! The fingertip library: size, material, moduli, springs, each with its source.
 
-use crate::{bundled, input};
+use crate::bundled;
+use crate::input::{self, BadInput};
 use models::finger::Finger;
+use models::rig_file::{Calibration, PassNoise, RigFile, RigFileError};
 use serde::{Deserialize, Serialize};
 use std::path::Path;
 
@@ -94,11 +96,37 @@ impl FingertipFile {
             let needed = format!("above 0, to {RADIUS_MAX_M}, in m");
             wrong.push((vec!["radius_m"], format!("radius_m = {}; {needed} is needed", self.radius_m)));
         }
-        if let Err(error) = self.finger.check() {
-            wrong.push((vec!["finger", error.name], error.to_string()));
+        if let Err((key, problem)) = usable(&self.finger) {
+            wrong.push((vec!["finger", key], problem));
         }
         wrong
     }
+
+    /// Reads the text of the file called `name`: what this takes is what a check of the file approves.
+    ///
+    /// # Errors
+    /// The first problem, with its place.
+    fn read(name: &str, text: &str) -> Result<Self, BadInput> {
+        let file: FingertipFile = input::parse_toml(name, text)?;
+        match file.problems().into_iter().next() {
+            None => Ok(file),
+            Some((place, problem)) => {
+                Err(BadInput::new(name, text, input::place_of(text, &place), problem, None))
+            }
+        }
+    }
+}
+
+/// Springs that a run's rig.toml takes, or else the key and the problem. The file of a tip and a setup's
+/// overrides have one judge, so that no run is refused for what a check approved.
+fn usable(finger: &Finger) -> Result<(), (&'static str, String)> {
+    let rig = RigFile { finger: *finger, noise: PassNoise::default(), calibration: Calibration::default() };
+    rig.check().map_err(|error| {
+        let RigFileError::Value { key, value, needed, .. } = error else { return ("", error.to_string()) };
+        let meant = input::unit_meant(key, value, input::usual(key));
+        let meant = meant.map_or(String::new(), |meant| format!(" ({meant})"));
+        (key, format!("{key} = {value}: {needed} is needed{meant}"))
+    })
 }
 
 /// Largest radius of a tip, m: a fist.
@@ -116,11 +144,8 @@ impl Fingertip {
                 format!("no fingertip '{}' ({e}); bundled: {}", setup.tip, bundled::names(BUNDLED))
             })?,
         };
-        let file: FingertipFile =
-            toml::from_str(&text).map_err(|e| format!("fingertip '{}': {e}", setup.tip))?;
-        if let Some((_, problem)) = file.problems().into_iter().next() {
-            return Err(format!("fingertip '{}': {problem}", setup.tip));
-        }
+        let file = FingertipFile::read(&setup.tip, &text)
+            .map_err(|e| format!("fingertip '{}'{}", setup.tip, e.after_its_name()))?;
         let finger = Finger {
             normal_stiffness_n_per_m: setup
                 .normal_stiffness_n_per_m
@@ -131,11 +156,56 @@ impl Fingertip {
             stiffness_relative_sd: setup.stiffness_relative_sd.unwrap_or(file.finger.stiffness_relative_sd),
             ..file.finger
         };
-        finger.check().map_err(|e| format!("fingertip '{}': {e}", setup.tip))?;
+        usable(&finger).map_err(|(_, problem)| format!("fingertip '{}': {problem}", setup.tip))?;
         let mu0 = setup.mu0.unwrap_or(file.mu0);
         if !(mu0.is_finite() && mu0 > 0.0) {
             return Err(format!("fingertip '{}': mu0 = {mu0}; a number above zero is needed", setup.tip));
         }
         Ok(Fingertip { name: file.name, kind: file.kind, mu0, finger })
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn resolved(text: &str) -> Result<Fingertip, String> {
+        let folder = tempfile::tempdir().unwrap();
+        std::fs::write(folder.path().join("tip.toml"), text).unwrap();
+        let setup: FingertipSetup = toml::from_str("tip = \"tip.toml\"").unwrap();
+        Fingertip::resolve(&setup, folder.path())
+    }
+
+    /// The file of a tip passed its check, and a setup that named it refused it with an error of TOML.
+    #[test]
+    fn a_setup_takes_a_tip_with_units_and_refuses_with_the_tips_own_place() {
+        let text = BUNDLED[0].1;
+        let units = text
+            .replace("radius_m = 8e-3", "radius_m = \"8mm\"")
+            .replace("normal_stiffness_n_per_m = 3.9e6", "normal_stiffness_n_per_m = \"3.9N/um\"");
+        assert_ne!(units, text);
+        assert_eq!(resolved(&units).unwrap(), resolved(text).unwrap());
+        let why = resolved(&text.replace("mu0 = 0.5", "mu0 = \"much\"")).unwrap_err();
+        assert!(why.starts_with("fingertip 'tip.toml', line 5: ") && !why.contains('\n'), "{why}");
+    }
+
+    /// A check approved these, and every setup that named them was refused for its rig.toml.
+    #[test]
+    fn what_a_setup_refuses_a_check_of_the_tip_refuses_too() {
+        for (from, to, words) in [
+            (
+                "= 3.9e6",
+                "= 2.5",
+                "normal_stiffness_n_per_m = 2.5: a number from 100 to 10000000000 is needed",
+            ),
+            ("= 3.9e6", "= 2.5", "N/\u{b5}m meant?"),
+            ("_sd = 0.05", "_sd = 30", "stiffness_relative_sd = 30: a number from 0 to 2 is needed"),
+        ] {
+            let text = BUNDLED[0].1.replace(from, to);
+            let problems = toml::from_str::<FingertipFile>(&text).unwrap().problems();
+            assert_eq!(problems.len(), 1, "{to}");
+            assert!(problems[0].1.contains(words), "{problems:?}");
+            assert!(resolved(&text).unwrap_err().contains(words), "{to}");
+        }
     }
 }

@@ -36,6 +36,16 @@ impl BadInput {
         let text = NamedSource::new(name, Arc::new(text.to_string()));
         BadInput { problem: problem.into(), remedy: remedy.into(), text, place: place.map(SourceSpan::from) }
     }
+
+    /// Line, problem and remedy as they follow the file's name in a refusal of a file that names it.
+    pub fn after_its_name(&self) -> String {
+        let place = self.place.map_or(String::new(), |place| {
+            let (line, _) = line_at(self.text.inner(), Some(place.offset()..place.offset()));
+            format!(", line {}", line + 1)
+        });
+        let remedy = self.remedy.as_ref().map_or(String::new(), |remedy| format!(" ({remedy})"));
+        format!("{place}: {}{remedy}", self.problem)
+    }
 }
 
 /// Everything that is wrong with one file.
@@ -134,13 +144,12 @@ pub fn unit_meant(key: &str, value: f64, [low, high]: [f64; 2]) -> Option<String
     if matches!(unit, "" | "%" | "a.u." | "deg C") || value == 0.0 || within(value) {
         return None;
     }
-    let prefixes: [(f64, &str); 4] = if value.abs() > high {
-        [(1e-3, "m"), (1e-6, "u"), (1e3, "k"), (1e6, "M")]
-    } else {
-        [(1e3, "k"), (1e6, "M"), (1e-3, "m"), (1e-6, "u")]
-    };
-    // A force a few times too large is a slip of another kind; so is a value that was written in small units.
-    if value.abs() > high && (value.abs() < 1.0 || unit == "N" && value.abs() < 50.0 * high) {
+    // Nobody means a millihertz or a kilometre: the prefixes that people use are those of the quantity.
+    const SMALL: [(f64, &str); 2] = [(1e-3, "m"), (1e-6, "u")];
+    const LARGE: [(f64, &str); 2] = [(1e3, "k"), (1e6, "M")];
+    let prefixes = if matches!(unit, "Hz" | "Pa" | "N/m") { LARGE } else { SMALL };
+    // A value a few times too large is a slip of another kind; from 1 on that is so of forces alone.
+    if value.abs() > high && value.abs() < 50.0 * high && (value.abs() < 1.0 || unit == "N") {
         return None;
     }
     let (factor, prefix) = prefixes.into_iter().find(|(factor, _)| within(value * factor))?;
@@ -263,16 +272,52 @@ pub fn in_si(text: &str) -> Cow<'_, str> {
 /// What TOML or the schema says, with the place. Unknown keys are errors wherever the schema says so.
 pub fn parse_toml<T: DeserializeOwned>(name: &str, text: &str) -> Result<T, BadInput> {
     toml::from_str(&in_si(text)).map_err(|e| {
-        let remedy = DeTable::parse(text).is_err().then(|| of_syntax(text, e.span()));
+        let remedy = match DeTable::parse(text) {
+            Err(_) if e.message() == "duplicate key" => Some(of_repeated(text, e.span())),
+            Err(_) => Some(of_syntax(text, e.span())),
+            Ok(_) if e.message().ends_with("expected a sequence") => as_list(text, e.span()),
+            Ok(_) => None,
+        };
         BadInput::new(name, text, e.span(), in_words(e.message()), remedy)
     })
 }
 
-/// What helps where a text is no TOML.
-fn of_syntax(text: &str, place: Option<Range<usize>>) -> String {
+/// The line of a place, counted from 0, without its comment.
+fn line_at(text: &str, place: Option<Range<usize>>) -> (usize, &str) {
     let at = place.map_or(0, |place| place.start);
     let line = text.get(..at).map_or(0, |before| before.matches('\n').count());
-    let value = text.lines().nth(line).and_then(|line| line.split('#').next()?.split_once('='));
+    (line, text.lines().nth(line).unwrap_or_default().split('#').next().unwrap_or_default().trim())
+}
+
+/// What helps where a key or a table stands twice.
+fn of_repeated(text: &str, place: Option<Range<usize>>) -> String {
+    let (_, line) = line_at(text, place);
+    let name = line.trim_matches(['[', ']']);
+    let both = [format!("[{name}]"), format!("[[{name}]]")];
+    let here =
+        |header: &String| text.lines().any(|l| l.split('#').next().unwrap_or_default().trim() == header);
+    match line.starts_with('[') {
+        true if both.iter().all(here) => format!("write [[{name}]] each time"),
+        true => format!("put all its keys under one [{name}], or remove one of them"),
+        false => "it stands twice in this table: remove one of them".into(),
+    }
+}
+
+/// How one value, or one table, is written where a list is needed: `["50kPa"]`, `[[series]]`.
+pub fn as_list(text: &str, place: Option<Range<usize>>) -> Option<String> {
+    let (_, line) = line_at(text, place);
+    match (line.strip_prefix('['), line.split_once('=')) {
+        (Some(name), _) => Some(format!("write [[{}]]", name.trim_end_matches(']'))),
+        (None, Some((key, value))) if !value.contains('{') => {
+            Some(format!("write {} = [{}]", key.trim(), value.trim()))
+        }
+        _ => None,
+    }
+}
+
+/// What helps where a text is no TOML.
+fn of_syntax(text: &str, place: Option<Range<usize>>) -> String {
+    let value = line_at(text, place).1.split_once('=');
     let number = value.and_then(|(_, value)| crate::quantity::with_point(value));
     number.filter(|number| number.parse::<f64>().is_ok()).map_or_else(
         || "a line of TOML is `key = value`, [table] or [[list]]; texts have quotation marks".into(),
@@ -365,10 +410,38 @@ mod tests {
             ("[base]\nfrequency_hz = 27,5 # kHz\n", "a number has a decimal point: 27.5"),
             ("[base\nfrequency_hz = 27\n", "`key = value`"),
             ("a = [1, 2\nb = 3\n", "`key = value`"),
+            ("[base]\nw = 1\nw = 2\n", "it stands twice in this table: remove one of them"),
+            ("[base]\nw = 1\n[base]\n", "put all its keys under one [base], or remove one of them"),
+            ("[[cell]]\nw = 1\n[cell] # two\n", "write [[cell]] each time"),
+            ("[cell]\nw = 1\n[[cell]]\n", "write [[cell]] each time"),
         ] {
             let why = parse_toml::<toml::Table>("plan.toml", text).unwrap_err();
             let help_text = miette::Diagnostic::help(&why).map(|help| help.to_string()).unwrap_or_default();
             assert!(help_text.contains(help), "{text}: {help_text}");
+        }
+    }
+
+    #[test]
+    fn one_value_where_a_list_is_needed_is_shown_as_a_list() {
+        #[derive(Debug, serde::Deserialize)]
+        struct Plan {
+            #[allow(dead_code, reason = "read, not used")]
+            series: Vec<Series>,
+        }
+        #[derive(Debug, serde::Deserialize)]
+        struct Series {
+            #[allow(dead_code, reason = "read, not used")]
+            ambient_pressure_pa: Vec<f64>,
+        }
+        for (text, help) in [
+            (
+                "[[series]]\nambient_pressure_pa = \"50kPa\" # low\n",
+                "write ambient_pressure_pa = [\"50kPa\"]",
+            ),
+            ("[series] # one\nambient_pressure_pa = [5e4]\n", "write [[series]]"),
+        ] {
+            let why = parse_toml::<Plan>("plan.toml", text).unwrap_err();
+            assert_eq!(miette::Diagnostic::help(&why).map(|help| help.to_string()).as_deref(), Some(help));
         }
     }
 
@@ -384,9 +457,19 @@ mod tests {
     #[test]
     fn a_prefix_is_suggested_for_units_that_take_one() {
         let of = |key, value| unit_meant(key, value, [1.0, 100.0]);
-        assert!(of("frequency_hz", 5000.0).is_some_and(|words| words.contains("mHz meant?")));
+        assert!(of("speed_m_s", 5000.0).is_some_and(|words| words.contains("mm/s meant?")));
+        assert!(of("frequency_hz", 0.05).is_some_and(|words| words.contains("kHz meant?")));
+        // Nobody writes millihertz or kilometres.
+        for (key, value) in [("frequency_hz", 5000.0), ("radius_m", 0.05), ("speed_m_s", 0.05)] {
+            assert_eq!(of(key, value), None, "{key}");
+        }
         for key in ["relative_humidity_pct", "skin_moisture_au", "temperature_c"] {
             assert_eq!(of(key, 5000.0), None, "{key}");
         }
+        // Half a metre of amplitude is half a micrometre; a speed twice too large is a speed.
+        let amplitude = |value| unit_meant("amplitude_pp_m", value, [0.0, 6e-6]);
+        assert!(amplitude(0.5).is_some_and(|words| words.contains("\u{b5}m meant? Then write 5e-7")));
+        assert_eq!(amplitude(1e-5), None);
+        assert_eq!(unit_meant("speed_m_s", 0.5, [0.0, 0.25]), None);
     }
 }

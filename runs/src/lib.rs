@@ -11,7 +11,7 @@
 //! | [`setup`], [`plan`], [`fingertip`] | rigs, plans, fingertips, all checked with the place in the file |
 //! | [`bundled`] | those that come with the program, by name |
 //! | [`calibrate`] | certificates from data; what only instruments give comes through a bench |
-//! | [`campaign`] | one plan with several tips, conditions and days; what the paper states, answered |
+//! | [`campaign`] | one plan with several tips, conditions and days: its sessions in their order |
 //! | [`certificates`], [`model_file`] | a setup's certificates, verified and applied once; a corrected model from its file to the loop |
 //! | [`rehearsal`] | a profile tried before any instrument is |
 //! | [`sequence`] | the order of a sweep: a pure state machine over the loop's rows |

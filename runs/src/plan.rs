@@ -279,11 +279,16 @@ impl Plan {
                 "add [[series]] with a list, as in amplitude_pp_m = [1e-6, 2e-6]".to_string(),
             );
         }
-        let listed = file.directions.iter().chain(file.series.iter().flat_map(|s| &s.directions));
-        if file.directions.is_empty() || listed.into_iter().any(|d| *d != 1 && *d != -1) {
-            wrong.add(&["directions"], "directions are 1, -1 or both", None);
+        let remedy = || "write [1], [-1] or [1, -1]".to_string();
+        let unknown = |all: &[i8]| all.iter().any(|d| *d != 1 && *d != -1);
+        if file.directions.is_empty() || unknown(&file.directions) {
+            wrong.add(&["directions"], "directions are 1, -1 or both", remedy());
         }
         for (index, series) in file.series.iter().enumerate() {
+            if unknown(&series.directions) {
+                let place = points::series_place(text, index, "directions");
+                wrong.add_at(place, "directions are 1, -1 or both", remedy());
+            }
             for (covariate, _) in series.lists().into_iter().filter(|(_, list)| list.is_empty()) {
                 if let Some(place) = points::series_place(text, index, covariate.name) {
                     let problem = format!("{} lists no value", covariate.name);

@@ -17,7 +17,7 @@ pub mod fidelity;
 pub mod groups;
 pub mod html;
 pub mod human;
-pub(crate) mod levels;
+pub mod levels;
 mod page;
 pub mod plots;
 pub mod published;
@@ -71,7 +71,7 @@ impl RunData {
 /// # Errors
 /// A folder that holds no run.
 pub fn read(folder: &Path) -> miette::Result<RunData> {
-    let passes = passes_in(folder).wrap_err_with(|| format!("{} holds no run", folder.display()))?;
+    let passes = passes_in(folder)?;
     let mut facts = BTreeMap::new();
     let mut files = BTreeMap::new();
     let mut events = Vec::new();

@@ -4,6 +4,7 @@
 //! those of the file system, where no others are stated.
 
 mod damage;
+mod journal;
 mod lines;
 mod lock;
 mod record_facts;
@@ -13,13 +14,14 @@ use crate::plan::Point;
 use crate::sequence::MeasuredPass;
 use crate::session::Notes;
 pub use damage::{damage_in, differences, missing_records, of_file};
+pub use journal::passes_in;
 use lines::{whole_passes, whole_table};
 pub use lock::{claim, holder, is_held};
 use miette::{Context, IntoDiagnostic};
 use models::pass::{self, Pass};
 pub use record_facts::{RecordFacts, header_facts, record_facts};
 use serde::{Deserialize, Serialize};
-use std::collections::{BTreeMap, BTreeSet};
+use std::collections::BTreeMap;
 use std::fs::{self, File, OpenOptions};
 use std::io::Write;
 use std::path::{Path, PathBuf};
@@ -139,6 +141,7 @@ impl RunDir {
                     other.join(" and ")
                 );
             }
+            identity.notes.agree_with(&before.notes, path)?;
             before_notes = before.notes;
         } else if path.exists() && holds_something(path)? {
             miette::bail!(
@@ -174,7 +177,11 @@ impl RunDir {
             let bytes = fs::read(path.join(name)).into_diagnostic().wrap_err_with(|| name.to_string())?;
             Ok::<_, miette::Report>((file, bytes))
         };
-        let (mut points, table) = open(POINTS)?;
+        let (mut points, mut table) = open(POINTS)?;
+        if table.len() < header.len() && header.starts_with(&table) {
+            points.file().write_all(&header[table.len()..]).into_diagnostic().wrap_err(POINTS)?;
+            table.clone_from(&header);
+        }
         if !table.starts_with(&header) {
             miette::bail!(
                 help = "give another --out: this table can be read, but not gone on with",
@@ -182,11 +189,12 @@ impl RunDir {
                 path.display()
             );
         }
-        let (made, whole) = whole_table(&table).wrap_err("points.csv of an earlier session")?;
+        let (mut made, whole) = whole_table(&table).wrap_err("points.csv of an earlier session")?;
         cut_torn(&mut points, whole, table.len(), POINTS)?;
         let (mut journal, lines) = open(JOURNAL)?;
-        let (_, whole) = whole_passes(&lines).wrap_err(JOURNAL)?;
+        let (passes, whole) = whole_passes(&lines).wrap_err(JOURNAL)?;
         cut_torn(&mut journal, whole, lines.len(), JOURNAL)?;
+        journal::restore(path, &mut points, &mut made, passes)?;
         let path = path.to_path_buf();
         let (planned, failed) = (None, false);
         Ok(RunDir { path, points, journal, _lock: lock, made, sessions, planned, identity, failed, new })
@@ -267,15 +275,13 @@ impl RunDir {
     }
 
     fn append(&mut self, measured: &MeasuredPass) -> miette::Result<()> {
-        let mut table = Vec::new();
-        pass::write_passes(std::slice::from_ref(&measured.pass), &mut table).into_diagnostic()?;
-        let header = table.iter().position(|b| *b == b'\n').map_or(0, |i| i + 1);
+        let row = journal::rows_of(std::slice::from_ref(&measured.pass))?;
         let mut line = serde_json::to_vec(measured).into_diagnostic()?;
         line.push(b'\n');
         // The journal first: a pass that is in the table is in the journal too.
         self.journal.write_all(&line).into_diagnostic().wrap_err(JOURNAL)?;
         self.journal.sync()?;
-        self.points.write_all(&table[header..]).into_diagnostic().wrap_err(POINTS)?;
+        self.points.write_all(&row).into_diagnostic().wrap_err(POINTS)?;
         self.points.sync()
     }
 
@@ -299,7 +305,7 @@ pub fn records_in(path: &Path) -> miette::Result<Vec<PathBuf>> {
 
 /// Whether it is named as a session's record: `run-NUMBER.mcap`. What else ends so was exported into the
 /// folder.
-fn is_record(path: &Path) -> bool {
+pub(crate) fn is_record(path: &Path) -> bool {
     let name = path.file_name().and_then(|name| name.to_str()).unwrap_or_default();
     let number = name.strip_prefix("run-").and_then(|rest| rest.strip_suffix(".mcap"));
     number.is_some_and(|number| !number.is_empty() && number.bytes().all(|b| b.is_ascii_digit()))
@@ -332,33 +338,6 @@ pub fn sessions_in(path: &Path) -> miette::Result<Vec<Session>> {
         serde_json::from_str(line).map_err(|e| miette::miette!("{}: line {}: {e}", file.display(), i + 1))
     };
     crate::input::text_of(&file)?.lines().enumerate().map(read).collect()
-}
-
-/// The passes of a run with their comparisons, each point once: a pass whose table line was lost with a power
-/// cut is not counted, one that was journalled twice counts once.
-///
-/// # Errors
-/// A folder that holds no run, or a table or journal that is damaged.
-pub fn passes_in(path: &Path) -> miette::Result<Vec<MeasuredPass>> {
-    let read = |name: &str| {
-        let file = path.join(name);
-        fs::read(&file).into_diagnostic().wrap_err_with(|| file.display().to_string())
-    };
-    let (table, _) = whole_table(&read(POINTS)?).wrap_err_with(|| path.join(POINTS).display().to_string())?;
-    let (journal, _) =
-        whole_passes(&read(JOURNAL)?).wrap_err_with(|| path.join(JOURNAL).display().to_string())?;
-    let in_table: BTreeSet<u64> = table.iter().map(|k| k.point).collect();
-    let last: BTreeMap<u64, usize> = journal.iter().enumerate().map(|(i, p)| (p.pass.point, i)).collect();
-    let counts = |i: usize, p: &MeasuredPass| in_table.contains(&p.pass.point) && last[&p.pass.point] == i;
-    let passes = journal.into_iter().enumerate().filter(|(i, p)| counts(*i, p)).map(|(_, p)| p).collect();
-    match table.iter().find(|k| !last.contains_key(&k.point)) {
-        None => Ok(passes),
-        Some(k) => miette::bail!(
-            "{}: point {} is in {POINTS} and not in {JOURNAL}: one of them is damaged",
-            path.display(),
-            k.point
-        ),
-    }
 }
 
 /// A power cut may leave part of a line at the end: it was never acknowledged and is cut off.

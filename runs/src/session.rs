@@ -5,6 +5,7 @@
 
 mod fast;
 pub mod keeper;
+pub mod licence;
 mod telemetry;
 
 pub use fast::{Rehearsal, rehearse, words};
@@ -30,7 +31,7 @@ use realtime::pacing::LoopReport;
 use realtime::stall_monitor::StallReport;
 use serde::{Deserialize, Serialize};
 use std::collections::BTreeMap;
-use std::path::PathBuf;
+use std::path::{Path, PathBuf};
 use std::sync::Arc;
 use std::sync::atomic::{AtomicBool, AtomicUsize};
 
@@ -87,6 +88,31 @@ impl Notes {
             sample: or(self.sample, &before.sample),
             licence: or(self.licence, &before.licence),
         }
+    }
+
+    /// Refuses other words than those of an earlier session: they would stand for its passes too.
+    ///
+    /// # Errors
+    /// Another operator, subject or sample than the run in this folder has.
+    pub fn agree_with(&self, before: &Notes, folder: &Path) -> miette::Result<()> {
+        let all = [
+            ("operator", &self.operator, &before.operator),
+            ("subject", &self.subject, &before.subject),
+            ("sample", &self.sample, &before.sample),
+        ];
+        for (name, now, before) in all {
+            let (Some(now), Some(before)) = (now, before) else { continue };
+            let shown = folder.display();
+            miette::ensure!(
+                now == before,
+                help = format!(
+                    "give another --out for another {name}; to go on with this run, leave --{name} away (`muprime runs {shown} \
+                     --note TEXT` notes more)"
+                ),
+                "{shown} holds a run whose {name} is '{before}', not '{now}'"
+            );
+        }
+        Ok(())
     }
 }
 
@@ -310,8 +336,10 @@ impl Job {
     /// Opens the run's folder and orders the passes that are left. Nothing is commanded, and nothing is written yet.
     ///
     /// # Errors
-    /// A refusal: passes that the rig cannot do, a folder of another run or of a living one.
+    /// A refusal: passes that the rig cannot do, a licence that is none, a folder of another run or of a
+    /// living one.
     pub fn begin(&mut self) -> miette::Result<Begun> {
+        self.notes.licence.as_deref().map(licence::address_of).transpose()?;
         let (points, followed) = self.points_seen(None)?;
         if let Some((target, _)) = followed {
             self.model = Arc::new(Rendering { law: Arc::clone(&self.model), target });

@@ -1,6 +1,7 @@
 //! What is wrong with whatever people write and the program wrote, with the place; and whether a plan can run on a setup.
 
 mod cells;
+mod own;
 mod place;
 mod shape;
 mod written;
@@ -65,6 +66,9 @@ const KINDS: &str = "a profile has [profile], a setup [amplifier], a plan [base]
 /// A file that cannot be read, or is none that muprime knows.
 pub fn kind_of(name: &str) -> miette::Result<&'static str> {
     let path = Path::new(name);
+    if let Some(kind) = own::kind_by_name(path) {
+        return Ok(kind);
+    }
     let unknown = || miette::miette!(help = KINDS, "{name} is none of the files that muprime knows");
     match path.extension().and_then(|e| e.to_str()).unwrap_or_default() {
         "csv" | "parquet" => return Ok("table"),
@@ -77,7 +81,7 @@ pub fn kind_of(name: &str) -> miette::Result<&'static str> {
                 Some("muprime.verdict") => Ok("verdict"),
                 Some("muprime.import") => Ok("import log"),
                 _ if document.get("planned").is_some() || document.get("outcome").is_some() => Ok("summary"),
-                _ => Err(unknown()),
+                _ => own::kind_of_document(path, &document).ok_or_else(unknown),
             };
         }
         _ if path.is_dir() => return Ok("run"),
@@ -131,7 +135,8 @@ pub fn refusal(why: miette::Report, name: &str, kind: &'static str) -> miette::R
     match kind_of(name) {
         _ if !Path::new(name).exists() => with_place_and_help(why, name, Some(kind)),
         Ok(other) if other != kind && file(name, &on).is_ok() => {
-            miette::miette!(help = remedy(Some(kind)), "{name} is a {other}; a {kind} is needed here")
+            let (other, needed) = (place::with_article(other), place::with_article(kind));
+            miette::miette!(help = remedy(Some(kind)), "{name} is {other}; {needed} is needed here")
         }
         _ => in_whole(judge(kind, name, &on, None).err().unwrap_or(why), kind, name, &on),
     }
@@ -162,6 +167,9 @@ fn in_whole(report: miette::Report, kind: &'static str, name: &str, on: &On) -> 
 fn judge(kind: &'static str, name: &str, on: &On, instead: Option<String>) -> miette::Result<Good> {
     let (path, good) = (Path::new(name), Good { kind, passes: None, remarks: Vec::new() });
     let folder = path.parent().unwrap_or(Path::new("."));
+    if let Some(judged) = own::judge(kind, path) {
+        return judged.map(|passes| Good { passes, ..good });
+    }
     match kind {
         "table" => return written::table(path),
         "record" => return written::record(path).map(|()| good),

@@ -87,7 +87,16 @@ pub fn cycles_bytes(folder: &Path, run: &RunData, points: &[u32]) -> miette::Res
     arrow::bytes(&cycles::of(folder, points)?, &facts::of(run, &facts::Stated::default()))
 }
 
-/// Exports the run in `folder` and returns where it stands: `to`, or the format's own name in the folder. A
+/// What was exported.
+#[derive(Debug)]
+pub struct Exported {
+    /// Where it stands.
+    pub file: PathBuf,
+    /// How many passes it holds: of a record that is cut fewer than the run has.
+    pub passes: usize,
+}
+
+/// Exports the run in `folder` to `to`, or to the format's own name in the folder. A
 /// licence that is stated now replaces the one that the run was made with.
 ///
 /// # Errors
@@ -99,18 +108,21 @@ pub fn export(
     format: Format,
     stated: &facts::Stated,
     to: Option<&Path>,
-) -> miette::Result<PathBuf> {
+) -> miette::Result<Exported> {
     let facts = facts::of(run, stated);
     let table = columns::of(&run.passes);
-    let place = to.map_or_else(|| folder.join(format.file()), Path::to_path_buf);
+    let file = to.map_or_else(|| folder.join(format.file()), Path::to_path_buf);
     let bytes = match format {
         Format::Csv => csv::bytes(&table)?,
         Format::Parquet => parquet::bytes(&table, &facts)?,
         Format::Arrow => arrow::bytes(&table, &facts)?,
         Format::Hdf5 => hdf5::bytes(&table, &facts)?,
-        Format::Mcap => return mcap::write(folder, run, &facts, &place).map(|()| place),
-        Format::RoCrate => crate_of_run::bytes(folder, run, &facts, &place)?,
+        Format::Mcap => {
+            let passes = mcap::write(folder, run, &facts, &file)?;
+            return Ok(Exported { file, passes });
+        }
+        Format::RoCrate => crate_of_run::bytes(folder, run, &facts, &file)?,
     };
-    runs::files::write_output(&place, &bytes)?;
-    Ok(place)
+    runs::files::write_output(&file, &bytes)?;
+    Ok(Exported { file, passes: run.passes.len() })
 }

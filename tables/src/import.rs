@@ -295,8 +295,8 @@ pub fn import(source: &str, bytes: &[u8], grid: &Grid, wanted: &Wanted<'_>) -> m
         if 2 * values.len() < of.0 {
             return Err(mostly_dropped(source, grid, wanted, &dropped, (values.len(), of), padded));
         }
-        let twice = series::last_twice(&mut values);
-        dropped.extend(twice);
+        let unusable = series::unusable(&mut values);
+        dropped.extend(unusable);
         let (passes, of_each, counts) =
             series::cut(&values, &cut).map_err(|e| miette::miette!("{source}: {e}"))?;
         (values, spreads) = (passes, of_each);

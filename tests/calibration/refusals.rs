@@ -89,6 +89,12 @@ fn a_bad_force_series_is_refused_with_the_reason() {
         .unwrap();
     assert!(said.status.success(), "{}", tests::texts(&said).1);
 
+    // The data in place of the certificate: what was said was an error of TOML's reader.
+    let said = tests::muprime().current_dir(at).args(["calibrate", "priors", "good.csv"]).output().unwrap();
+    let text = flat(&tests::texts(&said).1);
+    assert!(said.status.code() == Some(2) && text.contains("good.csv is no certificate"), "{text}");
+    assert!(text.contains("help: give certificates") && !text.contains("TOML"), "{text}");
+
     // Edited by hand, by one digit of one number: `check`, `priors` and a setup refuse it.
     let text = std::fs::read_to_string(at.join("good.toml")).unwrap();
     let place = text.find("value = ").unwrap() + "value = ".len();

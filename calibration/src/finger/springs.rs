@@ -13,7 +13,7 @@ use models::quantity::PeakToPeak;
 use models::rig_file::PassNoise;
 use models::spring_slider;
 use nalgebra::{DMatrix, DVector};
-use statrs::distribution::{ContinuousCDF, FisherSnedecor};
+use statrs::distribution::{ChiSquared, ContinuousCDF, FisherSnedecor};
 
 /// Range of the ratio that is searched.
 pub const RATIO_RANGE: [f64; 2] = [0.02, 5.0];
@@ -21,6 +21,9 @@ pub const RATIO_RANGE: [f64; 2] = [0.02, 5.0];
 const STIFFNESS_RANGE_N_PER_M: [f64; 2] = [2e4, 2e8];
 /// Passes with vibration that it takes: three quantities, and something to judge them by.
 const FEWEST: usize = 6;
+
+/// Probability below which the slider does not explain the passes: one good run in a thousand is refused.
+const LACK_OF_FIT_P: f64 = 1e-3;
 
 /// What passes say of the springs.
 #[derive(Clone, Debug, PartialEq, serde::Serialize)]
@@ -47,6 +50,8 @@ pub struct Springs {
     pub left_out: usize,
     /// Chi-square over its degrees of freedom: 1 where the slider explains the passes to what the rig repeats to.
     pub reduced_chi2: f64,
+    /// Probability of such a misfit or a larger one where the slider holds and the rig repeats as stated.
+    pub lack_of_fit_p: f64,
     /// Root mean square of the residuals, N.
     pub residual_rms_n: f64,
     /// Largest residual without its sign, N.
@@ -129,9 +134,24 @@ pub fn springs(passes: &[Pass], noise: &PassNoise) -> Result<Springs, FingerErro
         passes: vibrating,
         left_out: passes.len() - rows.len(),
         reduced_chi2,
+        lack_of_fit_p: ChiSquared::new(dof).map_or(1.0, |c| 1.0 - c.cdf(best.chi2)),
         residual_rms_n: (left.iter().map(|r| r * r).sum::<f64>() / rows.len() as f64).sqrt(),
         residual_largest_n: left.iter().fold(0.0, |a: f64, b| a.max(*b)),
     })
+}
+
+impl Springs {
+    /// The springs, where the slider explains the passes: stiffnesses of a law that does not hold are no
+    /// property of the finger, and a certificate would hand them on as one. The level is a force series'.
+    ///
+    /// # Errors
+    /// A misfit beyond what the rig repeats to.
+    pub fn of_a_law_that_holds(self) -> Result<Self, FingerError> {
+        match self.lack_of_fit_p < LACK_OF_FIT_P {
+            true => Err(FingerError::Misfit { reduced_chi2: self.reduced_chi2, passes: self.passes }),
+            false => Ok(self),
+        }
+    }
 }
 
 /// Residual of a pass in its standard deviations.
@@ -276,6 +296,28 @@ mod tests {
         passes[5].lateral_force_n = None;
         let fewer = springs(&passes, &noise).expect("springs");
         assert_eq!((fewer.left_out, fewer.passes), (2, whole.passes - 2));
+    }
+
+    /// Passes of a finger with air under it, which the slider lacks: stiffnesses of no finger were certified.
+    #[test]
+    fn passes_that_the_slider_does_not_explain_give_no_springs() {
+        let mut passes = passes(&Finger::paper());
+        let noise = PassNoise { pass_relative_sd: 0.015, force_sd_n: 8e-4 };
+        let fitted = |passes: &[Pass]| springs(passes, &noise).expect("springs").of_a_law_that_holds();
+        assert!(fitted(&passes).is_ok_and(|s| s.lack_of_fit_p > 0.01));
+        for pass in &mut passes {
+            let vibrates = pass.amplitude != PeakToPeak::ZERO;
+            let lifted = if vibrates && pass.amplitude.metres() < 2.2e-6 { 0.6 } else { 1.0 };
+            pass.lateral_force_n = pass.lateral_force_n.map(|force| lifted * force);
+        }
+        let why = fitted(&passes).unwrap_err();
+        assert!(
+            matches!(why, FingerError::Misfit { reduced_chi2, passes: 8 } if reduced_chi2 > 4.0),
+            "{why:?}"
+        );
+        assert!(
+            why.to_string().contains("muprime diagnose") && why.to_string().contains("--pass-relative-sd")
+        );
     }
 
     #[test]

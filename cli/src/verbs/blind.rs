@@ -3,6 +3,7 @@
 mod noise;
 
 use super::prelude::*;
+use clap::builder::RangedU64ValueParser;
 use studies::cases::kinds::blind::run as score_all;
 use studies::progress::Study;
 use studies::validation::blind::distance::by_cause;
@@ -13,7 +14,7 @@ use studies::validation::blind::{Scored, Settings, confusion, figures};
 #[derive(Debug, clap::Args)]
 pub struct Args {
     /// Number of sets.
-    #[arg(long, default_value_t = 100)]
+    #[arg(long, default_value_t = 100, value_parser = RangedU64ValueParser::<usize>::new().range(1..))]
     pub sets: usize,
     #[command(flatten)]
     pub of: Settings,
@@ -39,6 +40,7 @@ pub struct Args {
 pub fn run(args: Args, json: bool) -> miette::Result<ExitCode> {
     let stratum = args.of.stratum;
     if let Some(folder) = &args.write {
+        empty(folder)?;
         let (sets, to) = (args.sets, folder.display().to_string());
         let study = Study::begin(sets as u64, "sets", move |_: Vec<()>, done| {
             if json {
@@ -80,6 +82,18 @@ pub fn run(args: Args, json: bool) -> miette::Result<ExitCode> {
     drop(study);
     tell(&scored, seed, sets, false, json)?;
     Ok(ExitCode::SUCCESS)
+}
+
+/// The folder for the sets is new or holds nothing: what stands there is not replaced.
+fn empty(folder: &Path) -> miette::Result<()> {
+    if std::fs::read_dir(folder).is_ok_and(|mut found| found.next().is_none()) || !folder.exists() {
+        return Ok(());
+    }
+    miette::bail!(
+        help = "give an empty or new folder as --write",
+        "{} exists and is not an empty folder: nothing was replaced",
+        folder.display()
+    )
 }
 
 /// Figures and answers of the sets that were scored.

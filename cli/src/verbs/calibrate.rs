@@ -1,7 +1,7 @@
 //! `muprime calibrate force|amplitude|latency|phase|finger|creep|gravity|noise|step|tap ...`: data in, a certificate out.
 
 use super::prelude::*;
-use calibration::certificate::Certificate;
+use calibration::certificate::{Certificate, ReadError};
 use rig::bench::AtTheBench;
 use runs::calibrate::{Issued, What, certified, verify};
 use runs::report::human::{number, with_uncertainty};
@@ -60,8 +60,16 @@ fn priors(args: &PriorsArgs, json: bool) -> miette::Result<ExitCode> {
     let mut priors = models::rig_file::Calibration::default();
     for path in &args.certificates {
         let name = path.display().to_string();
-        let certificate = Certificate::from_toml(&runs::input::text_of(path)?)
-            .map_err(|e| miette::miette!("{name}: {e}"))?;
+        let text = runs::input::text_of(path)?;
+        // Of a file of another kind the place where TOML's reader stopped says nothing.
+        let other = |e: &ReadError| matches!(e, ReadError::Syntax(_)) && !text.contains("content_sha256");
+        let certificate = Certificate::from_toml(&text).map_err(|e| match other(&e) {
+            true => miette::miette!(
+                help = "give certificates: 'muprime calibrate noise', 'muprime calibrate force' and the others make them of data",
+                "{name} is no certificate, and the priors are those of certificates"
+            ),
+            false => miette::miette!("{name}: {e}"),
+        })?;
         let verified = verify(&name, &certificate, certificate.kind, &certificate.instrument.serial)?;
         calibration::prior::take(&mut priors, verified)
             .map_err(|refusal| miette::miette!("{name}: {refusal}"))?;

@@ -8,6 +8,7 @@ use diagnosis::progress::{Progress, Stage};
 use diagnosis::verdict::Diagnosis;
 use indicatif::ProgressBar;
 use miette::{Context, IntoDiagnostic};
+use runs::files::{MODEL, NEXT_PLAN, PAGE, PREDICTIONS, replaceable};
 use runs::input::{MAX_TABLE_BYTES, bytes_of};
 use runs::print::{self, folded};
 use runs::verdict::files;
@@ -92,10 +93,7 @@ pub fn run(args: Args, json: bool) -> miette::Result<ExitCode> {
     }
     let options = options(&args)?;
     let conditions = args.predict.as_ref().map(|path| conditions(path, &subject)).transpose()?;
-    // Before the work, not after it.
-    for out in [&args.predictions, &args.save_model, &args.report, &args.save_plan].into_iter().flatten() {
-        runs::files::replaceable(out, b"point,")?;
-    }
+    places(&args)?;
     let bar = studies::progress::bar(1000, "per mille");
     let progress = follow(&bar, json)?;
     let result = subject.diagnose(Options { progress, ..options }, run)?;
@@ -116,6 +114,31 @@ pub fn run(args: Args, json: bool) -> miette::Result<ExitCode> {
         out!("{}", folded(runs::verdict::words(&result, &subject.rig).trim_end(), 4));
     }
     Ok(ExitCode::SUCCESS)
+}
+
+/// Whether each output has a place of its own that it may take: judged before the work, not after it.
+fn places(args: &Args) -> miette::Result<()> {
+    let outputs = [
+        ("--predictions", &args.predictions, PREDICTIONS),
+        ("--save-model", &args.save_model, MODEL),
+        ("--report", &args.report, PAGE),
+        ("--save-plan", &args.save_plan, NEXT_PLAN),
+    ];
+    let mut taken: Vec<(&str, PathBuf)> = Vec::new();
+    for (option, path, begins) in outputs.iter().filter_map(|(o, path, b)| Some((*o, path.as_ref()?, *b))) {
+        let place = std::path::absolute(path).into_diagnostic()?;
+        let place = place.canonicalize().unwrap_or(place);
+        if let Some((other, _)) = taken.iter().find(|(_, before)| *before == place) {
+            miette::bail!(
+                help = "give each output a name of its own",
+                "{option}: {} is the place of {other} too",
+                path.display()
+            );
+        }
+        replaceable(path, begins)?;
+        taken.push((option, place));
+    }
+    Ok(())
 }
 
 /// The table on its base law, with the rig's calibration; and what is damaged in a run's folder.

@@ -27,9 +27,12 @@ pub fn run(args: Args, json: bool) -> miette::Result<ExitCode> {
     let run = runs::report::read(&args.run)?;
     let out = export(&args.run, &run, args.to, &args.stated, args.out.as_deref())?;
     if json {
-        answer_json(&json!({ "file": out, "passes": run.passes.len(), "damage": run.damage }));
+        answer_json(&json!({ "file": out.file, "passes": out.passes, "damage": run.damage }));
     } else {
-        say!("{} passes: {}", run.passes.len(), out.display());
+        match run.passes.len() {
+            all if all == out.passes => say!("{all} passes: {}", out.file.display()),
+            all => say!("{} of {all} passes, which the record holds: {}", out.passes, out.file.display()),
+        }
         run.damage.iter().for_each(|d| say!("{d}"));
     }
     exit(DONE)

@@ -10,7 +10,7 @@ use studies::validation::faults::{Pace, Tally};
 #[derive(Clone, Copy, Debug, clap::Args)]
 pub struct Scenes {
     /// How many seeds to run; each is one fault of the list in one phase
-    #[arg(long, default_value_t = 2000)]
+    #[arg(long, default_value_t = 2000, value_parser = clap::value_parser!(u64).range(1..))]
     pub seeds: u64,
     /// First seed
     #[arg(long, default_value_t = 1)]

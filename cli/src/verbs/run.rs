@@ -395,8 +395,9 @@ fn progress_bar(json: bool, planned: u64) -> ProgressBar {
 }
 
 fn tell(summary: &Summary, json: bool) {
+    let remarked = runs::report::about::Remarked::of(summary);
     if json {
-        answer_json(&json!({ "summary": summary }));
+        answer_json(&json!({ "summary": remarked }));
         return;
     }
     if !summary.off.read_back {
@@ -444,6 +445,7 @@ fn tell(summary: &Summary, json: bool) {
     if let Some(psi_star) = summary.psi_star {
         report!("{psi_star}");
     }
+    remarked.remarks.iter().for_each(|remark| report!("{remark}"));
     if summary.model_departed {
         report!("next: muprime diagnose {}", summary.folder.display());
     }

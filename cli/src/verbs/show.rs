@@ -9,7 +9,8 @@ use tables::schemas::bundled::all;
 
 #[derive(Debug, clap::Args)]
 pub struct Args {
-    /// Name of a plan, setup, fingertip or profile; without it all are listed
+    /// Name of a plan, setup, fingertip or profile; without it all are listed (--json: a stream, one
+    /// document a line for each)
     name: Option<String>,
     /// Write a sample table to try: measured now, on the virtual rig in virtual time
     #[arg(long, value_enum, conflicts_with = "name")]

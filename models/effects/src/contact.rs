@@ -166,7 +166,7 @@ pub fn mean_friction(c: &Contact) -> f64 {
     } else if c.asperity_height > 0.0 {
         asperities::mean_friction(c)
     } else if c.harmonic.ratio > 0.0 {
-        distorted::mean_friction(c)
+        closed_form(c) * distorted::friction_ratio(c)
     } else if c.needs_sweep() {
         sweep::mean_friction(c)
     } else {

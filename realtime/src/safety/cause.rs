@@ -179,11 +179,17 @@ impl Unit {
 
     /// A value with its unit, to four significant digits; what is infinite was never seen.
     pub fn of(self, value: f64) -> String {
+        self.beside(value, value)
+    }
+
+    /// The same in the unit that suits `other`, which stands beside it: nothing is 0 um beside 0.2 um.
+    fn beside(self, value: f64, other: f64) -> String {
         if value == f64::INFINITY {
             return "no data".into();
         }
         // Amplitudes and positions are read in micrometres where metres are all zeros.
-        let small = self == Self::Metre && value.abs() < 1e-3 && value != 0.0;
+        let largest = value.abs().max(if other.is_finite() { other.abs() } else { 0.0 });
+        let small = self == Self::Metre && largest < 1e-3 && largest != 0.0;
         let (value, symbol) = if small { (1e6 * value, "\u{b5}m") } else { (value, self.symbol()) };
         let magnitude = if value == 0.0 || !value.is_finite() { 0.0 } else { value.abs().log10().floor() };
         let digits = (3.0 - magnitude).clamp(0.0, 9.0) as usize;
@@ -212,7 +218,12 @@ impl fmt::Display for Trip {
             write!(f, ": there is no {missing}")?;
         }
         if self.unit != Unit::Flag {
-            write!(f, ": {} (limit {})", self.unit.of(self.value), self.unit.of(self.bound))?;
+            write!(
+                f,
+                ": {} (limit {})",
+                self.unit.beside(self.value, self.bound),
+                self.unit.beside(self.bound, self.value)
+            )?;
         }
         write!(f, ", at {:.3} s", self.at.seconds())?;
         self.cause.requirement().map_or(Ok(()), |id| write!(f, " [{id}]"))

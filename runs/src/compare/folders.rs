@@ -33,10 +33,18 @@ impl Compared {
         let [a, b] = [crate::report::read(folders[0])?, crate::report::read(folders[1])?];
         let [facts_a, facts_b] = [record_facts(folders[0])?, record_facts(folders[1])?];
         let [noise_a, noise_b] = [noise(folders[0])?, noise(folders[1])?];
-        let comparison = compare(&Side::of(&a, noise_a), &Side::of(&b, noise_b)).ok_or_else(|| {
+        let sides = [Side::of(&a, noise_a), Side::of(&b, noise_b)];
+        let bare: Vec<String> = folders
+            .iter()
+            .zip(&sides)
+            .filter(|(_, side)| side.reference().is_none())
+            .map(|(folder, _)| folder.display().to_string())
+            .collect();
+        let comparison = compare(&sides[0], &sides[1]).ok_or_else(|| {
             miette::miette!(
                 help = "mu' is friction over that without vibration: both runs need such passes",
-                "a run has no pass without vibration"
+                "{}: no pass without vibration",
+                bare.join(" and ")
             )
         })?;
         let [table_a, table_b] = [table(folders[0])?, table(folders[1])?];

@@ -52,6 +52,10 @@ impl Resolution {
     }
 }
 
+/// Steps of the amplifier that an amplitude has at least: the loop looks for a fifth of it (SR-22), which is
+/// then one step.
+const STEPS_MIN: f64 = 5.0;
+
 fn quantise(wanted: f64, step: f64) -> f64 {
     if step > 0.0 { (wanted / step).round() * step } else { wanted }
 }
@@ -83,6 +87,7 @@ impl Plan {
         let allows = |c: &Covariate| Some((allowed(c, limits), "this rig allows".to_string()));
         for index in 0..self.file.series.len() {
             self.check_series(index, &allows, &mut wrong);
+            self.check_settable(index, resolution, &mut wrong);
         }
         wrong.end()?;
         let conditions: Vec<Visit<'_>> =
@@ -223,6 +228,28 @@ impl Plan {
         }
     }
 
+    /// Tells of every amplitude of a series that the amplifier would set to nothing, or to so little that the
+    /// run would end for a plate that does not respond.
+    fn check_settable(&self, index: usize, resolution: &Resolution, wrong: &mut Problems<'_>) {
+        let list = &self.file.series[index].amplitude_pp_m;
+        let based = list.is_empty().then_some(self.file.base.amplitude_pp_m);
+        let least = STEPS_MIN * resolution.amplitude_pp_m;
+        // 5e-9 is not below five times 1e-9, whatever the last digits say.
+        for value in list.iter().copied().chain(based).filter(|w| *w > 0.0 && *w < least * (1.0 - 1e-9)) {
+            let place = match based {
+                None => series_place(&self.text, index, "amplitude_pp_m"),
+                Some(_) => input::place_of(&self.text, &["base", "amplitude_pp_m"]),
+            };
+            let [value, step, least] = [value, resolution.amplitude_pp_m, least].map(|w| quantity(w, "m"));
+            let problem = format!(
+                "amplitude_pp_m = {value} is too small for this rig: the amplifier sets steps of {step}, and of \
+                 less than {STEPS_MIN} steps the loop cannot see whether the plate responds (SR-22)"
+            );
+            let remedy = format!("give at least {least}, or 0 for a pass without vibration");
+            wrong.add_at(place, problem, remedy);
+        }
+    }
+
     fn check_travel(&self, conditions: &[Visit<'_>], limits: &Limits) -> Result<(), BadInput> {
         let (left, right) = limits.travel_m;
         for Visit { condition: c, edges, .. } in conditions {
@@ -296,6 +323,36 @@ mod tests {
         assert!(why.to_string().starts_with("normal_force_n = -0.25 N is outside"), "{why}");
         let help = why.help().unwrap().to_string();
         assert_eq!(help, "normal_force_n is a magnitude: write it without the minus sign");
+    }
+
+    /// It had neither a place nor a remedy.
+    #[test]
+    fn a_direction_of_a_series_that_is_none_is_refused_in_its_place() {
+        let text = "name = \"p\"\n[base]\namplitude_pp_m = 2e-6\nfrequency_hz = 27500\nspeed_m_s = 0.02\n\
+                    normal_force_n = 0.25\n[[series]]\namplitude_pp_m = [1e-6]\ndirections = [2]\n";
+        let why = Plan::parse("p", text).unwrap_err();
+        assert!(format!("{why:?}").contains("p:9:14"), "{why:?}");
+        assert_eq!(why.help().unwrap().to_string(), "write [1], [-1] or [1, -1]");
+    }
+
+    /// 1 nm ended in a trip of a plate that does not respond, and 0.4 nm was no vibration, in silence.
+    #[test]
+    fn an_amplitude_below_what_the_amplifier_sets_is_refused_in_its_place() {
+        let text = "name = \"p\"\n[base]\namplitude_pp_m = 2e-6\nfrequency_hz = 27500\nspeed_m_s = 0.02\n\
+                    normal_force_n = 0.25\n[[series]]\namplitude_pp_m = [0, WWW, 2e-6]\n";
+        let limits = Limits::paper(realtime::ports::Nanos(1_000_000));
+        let of = |w: &str, step| {
+            let plan = Plan::parse("p", &text.replace("WWW", w)).unwrap();
+            plan.points(1, &limits, &Resolution { amplitude_pp_m: step, frequency_hz: 0.1 })
+        };
+        for w in ["0.4e-9", "1e-9", "4.9e-9"] {
+            let why = of(w, 1e-9).unwrap_err();
+            assert!(why.to_string().contains("steps of 1 nm"), "{w}: {why}");
+            let help = why.help().unwrap().to_string();
+            assert_eq!(help, "give at least 5 nm, or 0 for a pass without vibration");
+            assert!(format!("{why:?}").contains("p:8:18"), "{why:?}");
+        }
+        assert!(of("5e-9", 1e-9).is_ok() && of("1e-9", 0.0).is_ok());
     }
 
     /// Two series that list the same pressures: each of their passes was made twice, and a pressure was

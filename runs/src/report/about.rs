@@ -1,12 +1,49 @@
 //! What stands first on a page: when, who, on what, with which rig and which certificates.
 
 use super::human::quantity;
+use crate::sequence::MeasuredPass;
+use crate::session::Summary;
 use calibration::certificate::date;
+use models::quantity::PeakToPeak;
 use models::rig_file::RigFile;
+use serde::Serialize;
 use std::collections::BTreeMap;
 use std::fs::File;
 use std::io::{BufRead, BufReader};
 use std::path::Path;
+
+/// The summary of a run with what is to be remarked of its passes, as summary.json and `run --json` have it.
+#[derive(Serialize)]
+pub struct Remarked<'a> {
+    #[serde(flatten)]
+    summary: &'a Summary,
+    /// Sentences for people.
+    #[serde(skip_serializing_if = "Vec::is_empty")]
+    pub remarks: Vec<String>,
+}
+
+impl<'a> Remarked<'a> {
+    /// Of the passes in the run's folder, as far as they can be read.
+    pub fn of(summary: &'a Summary) -> Self {
+        Remarked {
+            summary,
+            remarks: remarks(&crate::run_dir::passes_in(&summary.folder).unwrap_or_default()),
+        }
+    }
+}
+
+/// What a reader of the passes must know. Without a pass without vibration the loop has `mu_0` from the
+/// model, and the record keeps it: the model then stands in the measured values.
+pub fn remarks(passes: &[MeasuredPass]) -> Vec<String> {
+    let refers = |p: &MeasuredPass| p.pass.amplitude == PeakToPeak::ZERO && p.pass.lateral_force_n.is_some();
+    let measured = passes.iter().any(|p| p.comparison.is_some_and(|c| c.mu_relative.is_some()));
+    let rests = measured && !passes.iter().any(refers);
+    rests.then(|| NO_REFERENCE.to_string()).into_iter().collect()
+}
+
+/// The remark of a run without references.
+const NO_REFERENCE: &str =
+    "no pass without vibration: mu_0 is that of the model, so measured mu' rests on the model";
 
 /// When a run's first session began, by the wall clock; none where its folder does not say.
 fn began(folder: &Path) -> Option<String> {

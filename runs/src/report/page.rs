@@ -5,7 +5,7 @@ use super::html::{columns, escape, glossary, head, note, shell, table};
 use super::human::number;
 use super::published::Published;
 use super::traces::Trace;
-use super::{events, explore, fidelity, plots, published};
+use super::{about, events, explore, fidelity, plots, published};
 use crate::ambient::{AIR, LevelsFound, levels_of};
 use crate::sequence::Outcome;
 use std::fmt::Write;
@@ -92,6 +92,9 @@ fn verdict(w: &mut String, run: &RunData) {
         run.psi_star().map_or_else(String::new, |found| format!("<br>{}.", escape(&found.to_string())));
     let class = if departed { "verdict departed" } else { "verdict" };
     let _ = writeln!(w, "<p class=\"{class}\">{finding}<br>{outcome}{psi_star}</p>");
+    for remark in about::remarks(&run.passes) {
+        let _ = writeln!(w, "<p class=\"verdict departed\">{}.</p>", escape(&remark));
+    }
     if !run.damage.is_empty() {
         let items: String = run.damage.iter().map(|d| format!("<li>{}</li>", escape(d))).collect();
         let _ = writeln!(

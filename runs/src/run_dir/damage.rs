@@ -1,9 +1,10 @@
 //! What of a run's folder is no longer what was written.
 
-use super::lines::whole_table;
-use super::{JOURNAL, POINTS, passes_in, records_in, sessions_in};
+use super::lines::{whole_passes, whole_table};
+use super::{JOURNAL, POINTS, is_held, passes_in, records_in, sessions_in};
 use crate::sequence::MeasuredPass;
 use miette::{Context, IntoDiagnostic};
+use std::collections::BTreeSet;
 use std::fs::{self, File};
 use std::io::BufReader;
 use std::path::Path;
@@ -22,7 +23,7 @@ pub fn damage_in(path: &Path) -> miette::Result<Vec<String>> {
         findings.extend(found.sentences().iter().map(|s| of_file(&record, s)));
     }
     findings.extend(missing_records(path)?);
-    if path.join(POINTS).exists() && path.join(JOURNAL).exists() {
+    if path.join(POINTS).exists() || path.join(JOURNAL).exists() {
         match passes_in(path) {
             Ok(passes) => findings.extend(differences(path, &passes)?),
             Err(why) => findings.push(format!("{why:#}")),
@@ -46,14 +47,24 @@ pub fn missing_records(path: &Path) -> miette::Result<Vec<String>> {
     Ok(gone.map(|n| format!("run-{n}.mcap: the record of session {n} is missing")).collect())
 }
 
-/// Points whose line in the table is not what the journal holds.
+/// Points whose line in the table is not what the journal holds, and how many the table lacks: each counts
+/// once. The pass that a living session is storing is not missing.
 ///
 /// # Errors
-/// A table that cannot be read.
+/// A table or a journal that cannot be read.
 pub fn differences(path: &Path, passes: &[MeasuredPass]) -> miette::Result<Vec<String>> {
     let (table, _) = whole_table(&fs::read(path.join(POINTS)).into_diagnostic()?)?;
+    let (journal, _) = whole_passes(&fs::read(path.join(JOURNAL)).into_diagnostic()?)?;
     let differ = passes.iter().filter(|p| table.iter().any(|k| k.point == p.pass.point && *k != p.pass));
-    Ok(differ
+    let mut findings: Vec<String> = differ
         .map(|p| format!("point {}: {POINTS} and {JOURNAL} differ: one of them was changed", p.pass.point))
-        .collect())
+        .collect();
+    let points = |all: &mut dyn Iterator<Item = u64>| all.collect::<BTreeSet<u64>>();
+    let rows = points(&mut table.iter().map(|row| row.point));
+    let lost = points(&mut journal.iter().map(|p| p.pass.point)).difference(&rows).count();
+    if lost > usize::from(is_held(path)) {
+        let (passes, are) = if lost == 1 { ("pass", "is") } else { ("passes", "are") };
+        findings.push(format!("{lost} {passes} of {JOURNAL} {are} not in {POINTS}"));
+    }
+    Ok(findings)
 }

@@ -5,6 +5,7 @@
 use super::{Job, Notes, Summary, Unfinished, Update};
 use crate::ambient::levels_of;
 use crate::files::Placed;
+use crate::report::about::Remarked;
 use crate::run_dir::{RunDir, SUMMARY};
 use crate::sequence::{Event, MeasuredPass, Outcome};
 use crate::setup::Guards;
@@ -230,7 +231,7 @@ impl Keeper {
     }
 
     fn write_end(&self, summary: &Summary) -> miette::Result<()> {
-        let text = serde_json::to_vec_pretty(summary).into_diagnostic()?;
+        let text = serde_json::to_vec_pretty(&Remarked::of(summary)).into_diagnostic()?;
         self.dir.write(SUMMARY, &text).wrap_err("the summary")?;
         crate::fidelity::write(self.dir.path()).wrap_err("the fidelity")?;
         let html = crate::report::html(self.dir.path()).wrap_err("the report")?;

@@ -170,11 +170,11 @@ impl Iterator for Lines {
 /// Writes a file of cases whole or not at all: `lines` where each case has one, padded to the length of the longest.
 ///
 /// # Errors
-/// Whatever the file system says.
+/// Whatever the file system says; another file than one of cases is there.
 pub fn write(path: &Path, header: Header, lines: Option<&[Value]>) -> miette::Result<()> {
     let Some(lines) = lines else {
         let text = serde_json::to_string(&header).into_diagnostic()? + "\n";
-        return runs::files::write_whole(path, text);
+        return runs::files::write_output(path, text);
     };
     let texts: Vec<String> = lines.iter().map(Value::to_string).collect();
     let longest = texts.iter().map(String::len).max().unwrap_or(0).max(2);
@@ -185,7 +185,7 @@ pub fn write(path: &Path, header: Header, lines: Option<&[Value]>) -> miette::Re
     for text in texts {
         writeln!(all, "{text:longest$}").into_diagnostic()?;
     }
-    runs::files::write_whole(path, all)
+    runs::files::write_output(path, all)
 }
 
 /// Bytes in hexadecimal.

@@ -71,8 +71,10 @@ pub fn holes(there: &[Range<u64>], cases: u64) -> Vec<Range<u64>> {
 ///
 /// # Errors
 /// Holes, duplicates that differ, shards of other cases, of another version or of another build (unless
-/// `any_build`), a shard that is damaged, a disk that is full: no file is written then.
+/// `any_build`), a shard that is damaged, a disk that is full, another file at that place: no file is
+/// written then.
 pub fn gather(study: &Study, to: &Path, any_build: bool) -> miette::Result<Gathered> {
+    runs::files::replaceable(to, runs::files::GATHERED)?;
     let there = study.ranges_there()?;
     let cases = study.file.header.cases;
     let holes = holes(&there, cases);

@@ -260,7 +260,7 @@ pub struct Figure {
     pub name: &'static str,
     /// Its value; none where no set counts.
     pub value: Option<f64>,
-    /// 95 % interval: Wilson for shares, bootstrap for others.
+    /// 95 % interval: Wilson for shares, bootstrap for others, of which one value has none.
     pub ci95: Option<[f64; 2]>,
     /// Number of sets behind it.
     pub n: usize,
@@ -312,7 +312,8 @@ pub fn statistic<T: Copy>(
     Figure {
         name,
         value: Some(of(&mut values.to_vec())),
-        ci95: Some([draws[10], draws[389]]),
+        // One value drawn again and again says nothing of how far others lie from it.
+        ci95: (values.len() > 1).then_some([draws[10], draws[389]]),
         n: values.len(),
         target,
     }

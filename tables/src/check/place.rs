@@ -138,6 +138,22 @@ fn named(table: &toml::de::DeTable<'_>, words: &[&str], found: &mut Vec<(usize, 
     }
 }
 
+/// A kind of file with its article, for a sentence.
+pub(super) fn with_article(kind: &str) -> String {
+    match kind {
+        "identity" => "the run.toml of a run".into(),
+        "import log" => "the log of an import".into(),
+        "run" => "the folder of a run".into(),
+        "annotations" => "a file of tags and a note".into(),
+        "fidelity" => "the fidelity of a run that rendered".into(),
+        "signals of an export" | "claims of a campaign" | "tips of a campaign" => {
+            format!("a file with {kind}")
+        }
+        kind if kind.starts_with(['A', 'e']) => format!("an {kind}"),
+        kind => format!("a {kind}"),
+    }
+}
+
 /// What helps with a kind of file, where nothing better is known.
 pub(super) fn remedy(kind: Option<&str>) -> String {
     match kind {

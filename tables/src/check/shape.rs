@@ -83,7 +83,11 @@ fn all_wrong(schema: &Value, text: &str) -> Option<Vec<Wrong>> {
 /// its reader says that best.
 pub fn toml(schema: &Value, text: &str, problems: &mut Problems<'_>) {
     let wrong = all_wrong(schema, text).unwrap_or_default();
-    wrong.into_iter().for_each(|w| problems.add_at(w.place, w.problem, w.remedy));
+    for w in wrong {
+        let list = w.problem.ends_with("a list in [ ] is needed").then(|| w.place.clone());
+        let as_list = list.and_then(|place| runs::input::as_list(text, place));
+        problems.add_at(w.place, w.problem, as_list.or(w.remedy));
+    }
 }
 
 /// The text as it may have been meant, so that its values can be judged as well: misspelt keys by the names

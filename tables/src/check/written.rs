@@ -76,30 +76,48 @@ pub(super) fn run_folder(path: &Path) -> miette::Result<usize> {
     if !path.join("run.toml").exists() {
         miette::bail!(
             help = "name a folder that `muprime run --out` made",
-            "{} holds no run",
+            "{} holds no run: its run.toml is missing",
             path.display()
         );
     }
     let mut passes = 0;
-    let mut problems = Vec::new();
+    let (mut problems, mut helps) = (Vec::new(), Vec::new());
     for part in PARTS.iter().map(|part| path.join(part)).filter(|part| part.exists()) {
         let name = part.display().to_string();
         match kind_of(&name).and_then(|kind| judge(kind, &name, &On::default(), None)) {
             Ok(good) => passes = good.passes.unwrap_or(passes),
             // A run that has just begun has too few passes for a diagnosis; its table is checked below.
             Err(_) if part.ends_with("points.csv") => {}
-            Err(why) => problems.extend(problems_of(&why).into_iter().map(|p| p.problem)),
+            Err(why) => {
+                let named = |p: String| if p.contains(&name) { p } else { format!("{name}: {p}") };
+                problems.extend(problems_of(&why).into_iter().map(|p| named(p.problem)));
+                helps.push(again(&part));
+            }
         }
     }
-    problems.extend(runs::run_dir::damage_in(path)?);
+    let damage = runs::run_dir::damage_in(path)?;
+    helps.extend(damage.iter().map(|damage| match damage.starts_with("run-") {
+        true => "`muprime recover` repairs records; `muprime report` says what a damaged run still tells",
+        false => again(&path.join("points.csv")),
+    }));
+    problems.extend(damage);
     if problems.is_empty() {
         return Ok(passes);
     }
-    Err(miette::miette!(
-        help = "`muprime recover` repairs records; `muprime report` says what a damaged run still tells",
-        "{}",
-        problems.join("; ")
-    ))
+    let mut printed = std::collections::BTreeSet::new();
+    helps.retain(|help| printed.insert(*help));
+    Err(miette::miette!(help = helps.join("; "), "{}", problems.join("; ")))
+}
+
+/// What to do about a part of a run's folder that is damaged.
+fn again(part: &Path) -> &'static str {
+    match part.file_name().and_then(|name| name.to_str()) {
+        Some("summary.json" | "points.csv") => {
+            "repeat the command of the run with the same --out: it writes summary.json again, and puts the passes of \
+             passes.jsonl that points.csv lacks back"
+        }
+        _ => "take the file from a copy of the folder: it was cut or changed after it was written",
+    }
 }
 
 /// A verdict as `diagnose --json` prints it.

@@ -18,7 +18,7 @@ const CONFORMS: &str = "https://w3id.org/ro/crate/1.3";
 /// The description, for `place`, which must be [`FILE`] in the run's `folder`.
 ///
 /// # Errors
-/// No licence, another place, a run without its date, or a file that cannot be read.
+/// No licence or a text that is none, another place, a run without its date, or a file that cannot be read.
 pub fn bytes(folder: &Path, run: &RunData, facts: &Facts, place: &Path) -> miette::Result<Vec<u8>> {
     if place != folder.join(FILE) {
         miette::bail!(
@@ -37,7 +37,7 @@ pub fn bytes(folder: &Path, run: &RunData, facts: &Facts, place: &Path) -> miett
     let Some(began) = facts.get("date").filter(|date| date.starts_with(|c: char| c.is_ascii_digit())) else {
         miette::bail!("the folder does not say when the run began: {} has no sessions", folder.display());
     };
-    let address = address_of(licence);
+    let address = runs::session::licence::address_of(licence)?;
     let files = files_of(folder)?;
     let ids: Vec<Value> = files.iter().map(|file| json!({ "@id": file["@id"] })).collect();
     let plan = facts.get("plan").map_or("a plan", String::as_str);
@@ -128,11 +128,6 @@ fn addressed<'a>(stated: &'a str, within: &'a str) -> (&'a str, &'a str) {
 /// The name of a fact within the crate.
 fn id_of(fact: &str) -> String {
     format!("#fact-{fact}")
-}
-
-/// The address of a licence: of an SPDX identifier its page, of an address itself.
-fn address_of(licence: &str) -> String {
-    if licence.contains("://") { licence.into() } else { format!("https://spdx.org/licenses/{licence}") }
 }
 
 fn description(run: &RunData, facts: &Facts) -> String {

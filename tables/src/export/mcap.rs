@@ -12,21 +12,24 @@ use mcap::{Attachment, Compression, WriteOptions, Writer};
 use miette::{Context, IntoDiagnostic};
 use realtime::recorder::{EVENTS, Entry, HEADER, PASSES, Reader};
 use realtime::turn::Row;
-use runs::files::{beside, fresh, sync_folder_of};
+use runs::files::{FLAT_MCAP, beside, fresh, replaceable, sync_folder_of};
 use runs::report::RunData;
 use runs::run_dir::records_in;
 use runs::sequence::MeasuredPass;
 use std::borrow::Cow;
-use std::collections::BTreeMap;
+use std::collections::{BTreeMap, BTreeSet};
 use std::fs::File;
 use std::io::{BufReader, BufWriter, Write as _};
 use std::path::Path;
 
 /// Writes the records of all sessions of the run in `folder` to `to`, entry by entry: memory stays the same however long they are.
+/// Returns how many passes they hold.
 ///
 /// # Errors
-/// Whatever the file system or the format's library says. Nothing is left behind then.
-pub fn write(folder: &Path, run: &RunData, facts: &Facts, to: &Path) -> miette::Result<()> {
+/// Whatever the file system or the format's library says; another file is at that place. Nothing is left
+/// behind then.
+pub fn write(folder: &Path, run: &RunData, facts: &Facts, to: &Path) -> miette::Result<usize> {
+    replaceable(to, FLAT_MCAP)?;
     let part = beside(to);
     let written = fresh(&part).into_diagnostic().and_then(|file| {
         let mut flat = Flat::begin(BufWriter::new(file), run, facts).into_diagnostic()?;
@@ -34,12 +37,14 @@ pub fn write(folder: &Path, run: &RunData, facts: &Facts, to: &Path) -> miette::
             let file = File::open(&path).into_diagnostic()?;
             flat.record(BufReader::new(file)).wrap_err_with(|| path.display().to_string())?;
         }
+        let passes = flat.points.len();
         let mut file = flat.end().into_diagnostic()?;
         file.flush().into_diagnostic()?;
-        file.get_ref().sync_all().into_diagnostic()
+        file.get_ref().sync_all().into_diagnostic().map(|()| passes)
     });
-    let placed =
-        written.and_then(|()| std::fs::rename(&part, to).and_then(|()| sync_folder_of(to)).into_diagnostic());
+    let placed = written.and_then(|passes| {
+        std::fs::rename(&part, to).and_then(|()| sync_folder_of(to)).into_diagnostic().map(|()| passes)
+    });
     if placed.is_err() {
         let _ = std::fs::remove_file(&part);
     }
@@ -51,6 +56,8 @@ struct Flat {
     to: Writer<BufWriter<File>>,
     signals: Vec<(Signal, Topic, Held)>,
     passes: Vec<Topic>,
+    /// Points whose pass was written.
+    points: BTreeSet<u64>,
     events: Topic,
     text: Vec<u8>,
 }
@@ -106,7 +113,7 @@ impl Flat {
         let signals =
             SIGNALS.into_iter().zip(of_cycles).map(|(signal, topic)| (signal, topic, Held::default()));
         let signals = signals.collect();
-        Ok(Flat { to, signals, passes, events, text: Vec::with_capacity(64) })
+        Ok(Flat { to, signals, passes, points: BTreeSet::new(), events, text: Vec::with_capacity(64) })
     }
 
     /// One session's record.
@@ -144,6 +151,7 @@ impl Flat {
     }
 
     fn pass(&mut self, log_time: u64, pass: &MeasuredPass) -> miette::Result<()> {
+        self.points.insert(pass.pass.point);
         for (value, topic) in topics::of_pass(pass).into_iter().zip(&mut self.passes) {
             topic.value(&mut self.to, log_time, value, &mut self.text).into_diagnostic()?;
         }

@@ -27,8 +27,15 @@ pub fn parquet(path: &std::path::Path) -> miette::Result<Grid> {
     }
     // Readers that know Arrow find the units of the fields in its schema.
     let schema = parquet::arrow::parquet_to_arrow_schema(about.schema_descr(), about.key_value_metadata());
-    let units = schema.map(|s| s.fields().iter().map(|f| unit(f.metadata())).collect()).unwrap_or_default();
-    let cell = |field: &Field| match field {
+    let fields = schema.map(|s| s.fields().clone()).unwrap_or_default();
+    let ticks: Vec<Option<Ticks>> = fields.iter().map(|f| Ticks::of(f.data_type())).collect();
+    let units = (fields.iter().zip(&ticks))
+        .map(|(f, ticks)| if matches!(ticks, Some(Ticks::Span(_))) { "s".into() } else { unit(f.metadata()) })
+        .collect();
+    let cell = |k: usize, field: &Field| match field {
+        Field::Long(v) if ticks.get(k).is_some_and(Option::is_some) => {
+            ticks[k].as_ref().map_or(Cell::Empty, |ticks| ticks.cell(*v))
+        }
         Field::Null => Cell::Empty,
         Field::Double(v) if v.is_nan() => Cell::Empty,
         Field::Float(v) if v.is_nan() => Cell::Empty,
@@ -43,10 +50,45 @@ pub fn parquet(path: &std::path::Path) -> miette::Result<Grid> {
     };
     let mut rows = Vec::new();
     for (k, row) in (1..).zip(reader.get_row_iter(None).map_err(wrong)?) {
-        let cells = row.map_err(wrong)?.get_column_iter().map(|(_, f)| cell(f)).collect();
+        let cells = row.map_err(wrong)?.get_column_iter().enumerate().map(|(k, (_, f))| cell(k, f)).collect();
         rows.push(Row::new(k, cells));
     }
     Ok(Grid { units, ..Grid::named("Parquet".into(), names, rows) })
+}
+
+/// Whole numbers of a clock, with the power of ten of their unit in s.
+#[cfg(feature = "parquet")]
+enum Ticks {
+    /// A time since some day.
+    Clock(i32),
+    /// A length of time.
+    Span(i32),
+}
+
+#[cfg(feature = "parquet")]
+impl Ticks {
+    fn of(kind: &arrow_schema::DataType) -> Option<Self> {
+        use arrow_schema::{DataType, TimeUnit};
+        let ten = |unit: &TimeUnit| match unit {
+            TimeUnit::Second => 0,
+            TimeUnit::Millisecond => -3,
+            TimeUnit::Microsecond => -6,
+            TimeUnit::Nanosecond => -9,
+        };
+        match kind {
+            DataType::Timestamp(unit, _) | DataType::Time64(unit) => Some(Ticks::Clock(ten(unit))),
+            DataType::Duration(unit) => Some(Ticks::Span(ten(unit))),
+            _ => None,
+        }
+    }
+
+    fn cell(&self, count: i64) -> Cell {
+        match self {
+            Ticks::Clock(ten) => Cell::Clock(count as f64 / 10f64.powi(-ten)),
+            // Through the decimal digits: every nanosecond counts.
+            Ticks::Span(ten) => Cell::Text(format!("{count}e{ten}")),
+        }
+    }
 }
 
 /// The unit that the metadata of a field state.
@@ -215,4 +257,32 @@ pub fn npy(bytes: &[u8]) -> miette::Result<Grid> {
     let row = |r| Row::new(r as u64 + 1, (0..names.len()).map(|c| cell(r, c)).collect());
     let rows: Vec<Row> = (0..rows).map(row).collect();
     Ok(Grid::named("NumPy".into(), names, rows))
+}
+
+#[cfg(all(test, feature = "parquet"))]
+mod tests {
+    use super::*;
+    use arrow_array::{ArrayRef, DurationNanosecondArray, Int64Array, RecordBatch, TimestampNanosecondArray};
+    use std::sync::Arc;
+
+    #[test]
+    fn times_of_parquet_have_the_unit_of_their_type() {
+        let columns: [(&str, ArrayRef); 3] = [
+            ("at", Arc::new(TimestampNanosecondArray::from(vec![1_700_000_000_500_000_000]))),
+            ("span", Arc::new(DurationNanosecondArray::from(vec![2_500_000_001]))),
+            ("n", Arc::new(Int64Array::from(vec![7]))),
+        ];
+        let batch = RecordBatch::try_from_iter(columns).unwrap();
+        let folder = tempfile::tempdir().unwrap();
+        let path = folder.path().join("a.parquet");
+        let file = std::fs::File::create(&path).unwrap();
+        let mut writer = ::parquet::arrow::ArrowWriter::try_new(file, batch.schema(), None).unwrap();
+        writer.write(&batch).unwrap();
+        writer.close().unwrap();
+        let grid = super::parquet(&path).unwrap();
+        assert_eq!(grid.rows[0].cells[0], Cell::Clock(1_700_000_000.5));
+        assert_eq!(grid.rows[0].cells[1].digits(false).as_deref(), Some("2500000001e-9"));
+        assert_eq!(grid.units, ["", "s", ""]);
+        assert_eq!(grid.rows[0].cells[2].shown(), "7");
+    }
 }

@@ -66,7 +66,7 @@ fn reading(cell: &Cell) -> Option<Reading> {
             let parts: Vec<&str> = date.split(if dotted { '.' } else { '-' }).collect();
             let number = |k: usize| parts.get(k)?.parse::<i64>().ok();
             // A year of two digits might be a day.
-            let m = number(1).filter(|_| parts.len() == 3 && (!dotted || parts[2].len() == 4))?;
+            let m = number(1).filter(|_| parts.len() == 3 && parts[if dotted { 2 } else { 0 }].len() == 4)?;
             let (y, d) = if dotted { (number(2)?, number(0)?) } else { (number(0)?, number(2)?) };
             if !(0..=9999).contains(&y) || !(1..=12).contains(&m) || !(1..=31).contains(&d) {
                 return None;
@@ -201,8 +201,14 @@ mod tests {
         assert_eq!((at("1:02:03 PM"), at("12:00:01 am")), (Some(46_923.0), Some(1.0)));
         assert_eq!(day("29.02.2024 23:59:50,625", "2024-03-01 00:00:00"), 9.375);
         assert_eq!(day("01.03.2024 23:59:50,5", "2.3.2024 00:00:01,5"), 11.0);
-        for ambiguous in ["01/03/2024 10:00:00", "01.03.24 10:00:00", "01.13.2024 10:00:00", "01.03 10:00:00"]
-        {
+        for ambiguous in [
+            "01/03/2024 10:00:00",
+            "01.03.24 10:00:00",
+            "01.13.2024 10:00:00",
+            "01.03 10:00:00",
+            "01-03-24 10:00:00",
+            "01-03-2024 10:00:00",
+        ] {
             assert_eq!(at(ambiguous), None, "{ambiguous}");
         }
         assert_eq!(at("1.5"), None);

@@ -33,11 +33,13 @@ pub fn guess(grid: &Grid, stated: &Map) -> Vec<Taken> {
             continue;
         }
         let row_of_units = unit_row(&grid.units, index);
-        // Structures and recorders put their own name before a point.
-        let inner = || header.split_once('.').filter(|(_, name)| name.len() > 1);
-        let found = meant(header, row_of_units).or_else(|| meant(inner()?.1, row_of_units));
-        let Some((target, unit)) = found else { continue };
+        let Some((target, unit)) = found(header, row_of_units) else { continue };
         if target == Id::Run as usize && all_differ(grid, index) {
+            continue;
+        }
+        // Beside units of others a friction without one may be a force or a coefficient.
+        let unstated = !grid.units.is_empty() && unit.is_none();
+        if unstated && target == Id::FrictionForce as usize && plain(header) == "friction" {
             continue;
         }
         let signed = |c: &Cell| c.digits(grid.comma).is_some_and(|d| d.starts_with('-'));
@@ -83,6 +85,69 @@ pub fn guess(grid: &Grid, stated: &Map) -> Vec<Taken> {
     taken
 }
 
+/// Words of a name that is a mean.
+const MEANS: [&str; 6] = ["mean", "avg", "average", "mittel", "mittlere", "mittelwert"];
+/// Words of a name that is a deviation or an extreme, not the quantity.
+const STATISTICS: [&str; 15] = [
+    "std",
+    "sd",
+    "stdev",
+    "stddev",
+    "stdabw",
+    "dev",
+    "deviation",
+    "abw",
+    "standardabweichung",
+    "max",
+    "min",
+    "maximum",
+    "minimum",
+    "median",
+    "sem",
+];
+
+/// What a header means, also behind the name of a structure or the word for a mean.
+fn found(header: &str, row_of_units: Option<&str>) -> Option<(usize, Option<(String, Unit)>)> {
+    let mean = header.split_once([' ', '.', '_']).filter(|(word, _)| MEANS.contains(&plain(word).as_str()));
+    // Structures and recorders put their own name before a point; with a blank behind it, it shortens a word.
+    let owner = || header.split_once('.').filter(|(_, name)| name.len() > 1 && !name.starts_with(' '));
+    let inner = || mean.or_else(owner).map(|(_, name)| name.trim_start());
+    let (target, unit) = meant(header, row_of_units).or_else(|| meant(inner()?, row_of_units))?;
+    let deviations = [Id::NormalForceSd as usize, Id::LateralForceSd as usize];
+    let minutes = unit.as_ref().is_some_and(|(text, _)| text.ends_with("min"));
+    let statistic =
+        |word: &str| STATISTICS.contains(&plain(word).as_str()) && !(minutes && plain(word) == "min");
+    let is_word = |c: char| !c.is_alphanumeric();
+    (deviations.contains(&target) || !outside(header).split(is_word).any(statistic)).then_some((target, unit))
+}
+
+/// A header without what is in brackets.
+fn outside(header: &str) -> String {
+    let mut depth = 0;
+    let keeps = |c: &char| {
+        depth += i32::from("([{".contains(*c)) - i32::from(")]}".contains(*c));
+        depth <= 0
+    };
+    header.chars().filter(keeps).collect()
+}
+
+/// The unit that a column states although none of its quantity's units is meant, with that quantity: why a
+/// column with a known name is not guessed.
+pub fn open_unit(grid: &Grid, index: usize) -> Option<(usize, String)> {
+    let (header, row) = (&grid.header[index], unit_row(&grid.units, index));
+    let unit = stated(header).or(row).map(str::trim).filter(|unit| !unit.is_empty())?;
+    let name = name_of(header);
+    let target = TARGETS.iter().position(|t| t.is_headed(&name))?;
+    // A letter alone has many meanings.
+    let number = matches!(TARGETS[target].kind, ColumnKind::Number(_)) && name.len() > 1;
+    (number && found(header, row).is_none()).then(|| (target, unit.to_string()))
+}
+
+/// How a header says that an amplitude is counted, if it does.
+pub fn stroke(header: &str) -> Option<Id> {
+    without_stroke(header).map(|(_, id)| id)
+}
+
 /// A name without the unit behind it, case, blanks and marks.
 pub fn name_of(header: &str) -> String {
     let cut =
@@ -96,7 +161,7 @@ pub fn heads(text: &str) -> bool {
 }
 
 /// Words that say how an amplitude is counted.
-const STROKES: [(&str, Id); 23] = [
+const STROKES: [(&str, Id); 24] = [
     ("spitze-spitze", Id::AmplitudePp),
     ("peak-to-peak", Id::AmplitudePp),
     ("peak to peak", Id::AmplitudePp),
@@ -115,6 +180,7 @@ const STROKES: [(&str, Id); 23] = [
     ("p2p", Id::AmplitudePp),
     ("ptp", Id::AmplitudePp),
     ("pp", Id::AmplitudePp),
+    ("zero_to_peak", Id::AmplitudePeak),
     ("0-pk", Id::AmplitudePeak),
     ("0-p", Id::AmplitudePeak),
     ("peak", Id::AmplitudePeak),
@@ -169,6 +235,14 @@ fn named(header: &str, row_of_units: Option<&str>) -> Option<(usize, Option<(Str
     let with_unit = |name: &str, text: &str| {
         let at = find(name)?;
         let ColumnKind::Number(dimension) = TARGETS[at].kind else { return None };
+        // Friction without a dimension is the coefficient.
+        if at == Id::FrictionForce as usize
+            && plain(name) == "friction"
+            && !text.trim().is_empty()
+            && let Some(unit) = Unit::guess(Dimension::Ratio, text)
+        {
+            return Some((Id::FrictionCoefficient as usize, Some(unit)));
+        }
         Some((at, Some(Unit::guess(dimension, text)?)))
     };
     for (open, close) in [('[', ']'), ('(', ')')] {
@@ -198,10 +272,15 @@ fn named(header: &str, row_of_units: Option<&str>) -> Option<(usize, Option<(Str
         return None;
     }
     let at = find(header)?;
-    // A unit that is none of this quantity says that the column is something else, or needs more than a name.
-    if row_of_units.is_some() && matches!(TARGETS[at].kind, ColumnKind::Number(_)) {
+    // A unit that is none of this quantity says that the column is something else, or needs more than a name;
+    // signs are units too.
+    let sign = header.contains(['%', '°', '‰']) || stated(header).is_some_and(|u| !u.trim().is_empty());
+    if (row_of_units.is_some() || sign) && matches!(TARGETS[at].kind, ColumnKind::Number(_)) {
         return None;
     }
     // Force or frequency, amplitude or amplifier: only a unit tells.
     (!["f", "amp", "ampl"].contains(&plain(header).as_str())).then_some((at, None))
 }
+
+#[cfg(test)]
+pub(super) mod tests;

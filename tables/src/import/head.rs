@@ -2,10 +2,38 @@
 
 use super::grid::{Block, Cell, Grid, Row};
 use super::guess::{heads, name_of};
+use super::map::stated;
+use super::targets::plain;
 use super::units::is_unit;
 
 /// Why a text among the rows is left out.
 pub const ONE_TEXT: &str = "one text, no row of the table";
+
+/// Names of rows that sum others up, plain.
+const SUMMARIES: [&str; 22] = [
+    "mean",
+    "average",
+    "avg",
+    "mittel",
+    "mittelwert",
+    "median",
+    "std",
+    "stdev",
+    "stddev",
+    "stdabw",
+    "sd",
+    "standarddeviation",
+    "standardabweichung",
+    "min",
+    "max",
+    "minimum",
+    "maximum",
+    "sum",
+    "summe",
+    "total",
+    "meanvalue",
+    "standarddev",
+];
 
 /// What cures a table without rows.
 pub const NO_ROWS_HELP: &str = "export the table with its rows of numbers";
@@ -70,6 +98,19 @@ impl Source {
         })
     }
 
+    /// The first row of the data. Rows of a word and its value above a row of words are no data, even where
+    /// the table is as narrow.
+    fn first(&self, rows: &[Row], is_data: &dyn Fn(&Row) -> bool) -> usize {
+        let first = rows.iter().position(is_data).unwrap_or(rows.len());
+        let pair = |r: &Row| {
+            r.filled() == 2 && r.width() == 2 && !r.cells[0].is_number(self.comma) && self.numbers(r) == 1
+        };
+        let table = (first..rows.len()).find(|k| is_data(&rows[*k]) && !pair(&rows[*k]));
+        let headed =
+            |k: &usize| rows[..*k].iter().rfind(|r| r.filled() > 0).is_some_and(|r| self.is_words(r));
+        table.filter(|k| *k > first && headed(k)).unwrap_or(first)
+    }
+
     /// Finds headers, units and data among rows: data begin with the first row of mostly numbers that is about as wide as most.
     pub fn find(&self, rows: Vec<Row>) -> Grid {
         let mut widths: Vec<usize> = rows.iter().map(Row::filled).filter(|n| *n > 0).collect();
@@ -79,7 +120,7 @@ impl Source {
             let numbers = self.numbers(row);
             2 * row.filled() >= usual && 2 * numbers >= row.filled() && numbers > 0
         };
-        let first = rows.iter().position(is_data).unwrap_or(rows.len());
+        let first = self.first(&rows, &is_data);
         // The header is judged by the rows that it heads: other words further down may head wider ones.
         let words_below = rows.iter().skip(first).position(|r| self.is_words(r) && r.filled() > 1);
         let end = words_below.map_or(rows.len(), |k| first + k);
@@ -181,6 +222,8 @@ impl Source {
         let begin = rows.first().map_or(u64::MAX, |r| r.place);
         while comments.next_if(|c| c.place < begin).is_some() {}
         let (mut block, mut pending): (usize, Vec<(Row, bool)>) = (0, Vec::new());
+        // Why the rows cannot be those of the table any more.
+        let mut ended: Option<String> = None;
         for row in rows {
             while let Some(comment) = comments.next_if(|c| c.place < row.place) {
                 pending.push((comment.clone(), true));
@@ -193,15 +236,62 @@ impl Source {
                 continue;
             }
             let taken = self.next_block(grid, &pending, &mut block, &row);
+            if taken > 0 {
+                ended = None;
+            } else {
+                ended = self.ends(grid, &pending, block).or(ended);
+            }
             let rest = pending.len() - taken;
-            pending
-                .drain(..)
-                .take(rest)
-                .filter(|(_, comment)| !comment)
-                .for_each(|(r, _)| self.put(grid, r, block, wide));
-            self.put(grid, row, block, wide);
+            let rest = pending.drain(..).take(rest).filter(|(_, comment)| !comment).map(|(r, _)| r);
+            for row in rest.chain([row]) {
+                match &ended {
+                    Some(why) => grid.left_out.push((row.place, texts(&row).join(" "), why.clone())),
+                    None => self.put(grid, row, block, wide),
+                }
+            }
         }
         pending.into_iter().filter(|(_, comment)| !comment).for_each(|(r, _)| self.put(grid, r, block, wide));
+    }
+
+    /// Why the rows below the last of these are no rows of the table: it states other units, or is a header
+    /// that is not known.
+    fn ends(&self, grid: &Grid, pending: &[(Row, bool)], block: usize) -> Option<String> {
+        let (last, _) = pending.iter().rfind(|(_, comment)| !comment)?;
+        let cells = texts(last);
+        let words: Vec<&String> = cells.iter().filter(|w| !w.is_empty()).collect();
+        if words.len() < 2 || self.numbers(last) > 0 {
+            return None;
+        }
+        let (header, units) = match block.checked_sub(1) {
+            None => (&grid.header, &grid.units),
+            Some(k) => (&grid.blocks[k].header, &grid.blocks[k].units),
+        };
+        let bare = |text: &str| text.trim_matches(['[', ']', '(', ')', ' ']).to_string();
+        let missing = ["n/a", "none", "x"];
+        if words.iter().all(|w| is_unit(w)) {
+            let now = |k: usize| {
+                let own = units.get(k).filter(|u| !u.is_empty()).map(String::as_str);
+                own.or_else(|| stated(header.get(k)?)).map(bare).unwrap_or_default()
+            };
+            let other = |(k, word): (usize, &String)| !word.is_empty() && bare(word) != now(k);
+            return (cells.iter().enumerate().any(other)
+                && !words.iter().all(|w| missing.contains(&w.as_str())))
+            .then(|| {
+                format!("below row {}, which states other units: make a file of each part", last.place)
+            });
+        }
+        // Marks of failed readings stand in rows of words too: they are alike, or in a column of words.
+        let distinct = words.iter().enumerate().all(|(k, w)| !words[..k].contains(w));
+        let above = grid.rows.last().map(|r| &r.cells[..]).unwrap_or_default();
+        let beside = (above.iter().zip(&last.cells))
+            .any(|(a, b)| matches!((a, b), (Cell::Text(_), Cell::Text(_))) && !a.is_number(self.comma));
+        let named = words.iter().all(|w| w.starts_with(|c: char| c.is_alphabetic()));
+        (distinct && named && !beside && 2 * words.len() >= header.len()).then(|| {
+            format!(
+                "below the words of row {}, which name no column of the table: make a file of each part, or give them the same columns",
+                last.place
+            )
+        })
     }
 
     /// Whether the pending rows end with a header, and which block it begins; how many rows that takes.
@@ -265,7 +355,10 @@ impl Source {
             Some(k) => grid.blocks[k].header.len(),
         };
         let cells = row.width();
-        let why = if cells == 1 && names > 1 && self.numbers(&row) == 0 {
+        let sums = |c: &&Cell| matches!(c, Cell::Text(t) if SUMMARIES.contains(&plain(t).as_str()));
+        let why = if let Some(cell) = row.cells.iter().find(sums) {
+            Some(format!("'{}' sums up other rows: no pass", cell.shown()))
+        } else if cells == 1 && names > 1 && self.numbers(&row) == 0 {
             Some(ONE_TEXT.to_string())
         } else if !self.places && (cells > names || self.blanks && cells < names) {
             Some(format!("{cells} cells in place of {names}"))
@@ -280,3 +373,6 @@ impl Source {
         grid.rows.push(row);
     }
 }
+
+#[cfg(test)]
+mod tests;

@@ -1,9 +1,12 @@
 //! Which column of the source is what: stated by `--map` and `--set`, or guessed from the headers.
 
 use super::grid::{Block, Grid};
-use super::guess::unit_of;
 use super::targets::{ColumnKind, Id, TARGETS, Target};
 use super::units::{Dimension, Unit};
+
+mod doubts;
+
+pub use doubts::contradicted;
 
 /// What is wrong with an entry of `--map` or `--set`, or with the map under a second header (in row `row`).
 #[derive(Clone, Debug, PartialEq, Eq, thiserror::Error)]
@@ -184,7 +187,11 @@ impl Map {
             (
                 "time_s",
                 self.time_by_rows,
-                "HEADER=time:s, or --set time_s=rows (row after row, a second each)",
+                if series {
+                    "HEADER=time:s, or of a column that counts the samples HEADER=time:0.01s (every 0.01 s)"
+                } else {
+                    "HEADER=time:s, or --set time_s=rows (row after row, a second each)"
+                },
             ),
             (
                 "amplitude_pp_m",
@@ -218,9 +225,11 @@ impl Map {
                 let path = column == "speed_m_s" && gives("position_m");
                 let more =
                     if path { ", or --series if the rows are samples of a record in time" } else { "" };
-                wrong.push(format!("{column} is missing: {how}{more}"));
+                let open = doubts::open(self, grid, column);
+                wrong.push(format!("{column} is missing: {how}{more}{open}"));
             }
         }
+        wrong.extend(self.columns.iter().filter_map(|c| doubts::signed(c, grid)));
         wrong
     }
 }
@@ -301,18 +310,6 @@ fn column(grid: &Grid, entry: &str) -> Result<Taken, MapError> {
     let written = unit_row(&grid.units, index).or_else(|| stated(&grid.header[index]));
     let (target, unit, unit_text) = target_of(rest, written)?;
     Ok(Taken { index, header: grid.name(index), target, unit_text, unit, assumed: false })
-}
-
-/// Columns whose unit in the map is another than in the source, in sentences. A sign is no other unit.
-pub fn contradicted(map: &Map, grid: &Grid) -> Vec<String> {
-    let size = |unit: &Unit| (unit.factor().abs(), unit.offset().abs());
-    let contradiction = |c: &Taken| {
-        let (text, unit) = unit_of(grid, c.index, c.target)?;
-        let words = "the map was taken: correct it if the header is right";
-        let both = format!("{}: the header says {text}, the map says {}; {words}", c.header, c.unit_text);
-        (size(&unit) != size(&c.unit)).then_some(both)
-    };
-    map.columns.iter().filter_map(contradiction).collect()
 }
 
 fn constant(entry: &str) -> Result<Option<Constant>, MapError> {

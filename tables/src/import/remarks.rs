@@ -21,13 +21,15 @@ pub struct Range {
 const USUAL: [(&Covariate, [f64; 2]); 6] = [
     (&covariate::AMPLITUDE, [1e-8, 1e-4]),
     (&covariate::FREQUENCY, [1e3, 1e6]),
-    (&covariate::SPEED, [1e-8, 20.0]),
+    (&covariate::SPEED, [1e-8, 2.0]),
     (&covariate::NORMAL_FORCE, [1e-4, 1e3]),
     (&covariate::POSITION, [1e-9, 1.0]),
     (&covariate::AMBIENT_PRESSURE, [1e2, 1e6]),
 ];
 /// Lateral over normal force: from well lubricated to soft rubber.
 const RATIO: [f64; 2] = [2e-3, 20.0];
+/// A standard deviation within a pass over its mean from which on the mean may be that of both directions.
+const HIDDEN: f64 = 3.0;
 /// Largest speed of a vibrating plate in m/s, `pi f w`.
 const PLATE_SPEED: f64 = 10.0;
 
@@ -74,6 +76,21 @@ fn slip(value: f64, [low, high]: [f64; 2]) -> Option<&'static str> {
     .find_map(|(factor, words)| within(value * factor).then_some(words))
 }
 
+/// Passes whose lateral force scatters as it does where the sliding turns within them.
+fn hidden_reversals(passes: &[Pass]) -> Option<String> {
+    let hidden =
+        |p: &&Pass| p.lateral_force_sd_n.zip(p.lateral_force_n).is_some_and(|(sd, f)| sd > HIDDEN * f.abs());
+    let count = passes.iter().filter(hidden).count();
+    (2 * count > passes.len()).then(|| {
+        format!(
+            "the lateral force scatters within a pass by more than {HIDDEN} times its mean in {count} of {} passes: are reversals hidden \
+             in them? A position that counts the way up, or a speed without a sign, does not show them: map a position or a \
+             velocity with a sign",
+            passes.len()
+        )
+    })
+}
+
 /// Everything that looks wrong in a point table, in sentences.
 pub fn of_table(passes: &[Pass]) -> Vec<String> {
     let all = covariate::REQUIRED.iter().chain(covariate::OPTIONAL.iter());
@@ -115,6 +132,7 @@ pub fn remarks(passes: &[Pass], columns: &[&'static str]) -> Vec<String> {
             number(fastest)
         ));
     }
+    list.extend(hidden_reversals(passes));
     let mut runs: Vec<_> = passes.iter().filter_map(|p| p.run.as_deref()).collect();
     runs.sort_unstable();
     if passes.len() > 3 && runs.len() == passes.len() && runs.windows(2).all(|pair| pair[0] != pair[1]) {
@@ -122,8 +140,10 @@ pub fn remarks(passes: &[Pass], columns: &[&'static str]) -> Vec<String> {
     }
     match Table::measured(passes) {
         Err(DataError::Unsigned) => list.push(
-            "the lateral force has one sign in both directions, and the same size: friction turns with the direction. If these are \
-             magnitudes, map the column as friction_force in place of lateral_force; as it is, diagnose refuses the table"
+            "the lateral force has one sign in both directions, and the same size: friction turns with the direction. If the column \
+             holds magnitudes, map it as friction_force in place of lateral_force; if it was mapped as friction_force or \
+             friction_coefficient, its values have a sign already: map the signed force as lateral_force. As it is, diagnose refuses \
+             the table"
                 .into(),
         ),
         Err(error) => list.push(format!("diagnose will refuse the table: {error}")),

@@ -63,7 +63,8 @@ pub fn cut(samples: &[Values], how: &Cut) -> Result<(Vec<Values>, Vec<Spread>, C
         let why = if times[k + 1] < times[k] {
             "it goes back: give one record at a time"
         } else {
-            "samples share a stamp: the clock is too coarse; map time from a finer column, or set it from the sampling rate"
+            "samples share a stamp: the clock is too coarse; map time from a finer column, or from one that counts the samples at a \
+             known rate (--map Sample=time:0.01s is a sample every 0.01 s)"
         };
         return Err(format!(
             "the time does not rise from row {} ({} s) to row {} ({} s): {why}",
@@ -77,6 +78,7 @@ pub fn cut(samples: &[Values], how: &Cut) -> Result<(Vec<Values>, Vec<Spread>, C
     let turns = turning_points(&path);
     let mut counts =
         Counts { samples: samples.len(), reversals: turns.len().saturating_sub(2), ..Counts::default() };
+    refuse_one_way(samples, &turns)?;
     let legs: Vec<(usize, (Vec<f64>, usize))> =
         turns.windows(2).map(|leg| (leg[0], velocities(&times, &path, leg[0], leg[1]))).collect();
     let fastest = legs.iter().flat_map(|(_, (slopes, _))| slopes).fold(0.0f64, |m, v| m.max(v.abs()));
@@ -122,16 +124,56 @@ pub fn cut(samples: &[Values], how: &Cut) -> Result<(Vec<Values>, Vec<Spread>, C
     Ok((passes, spreads, counts))
 }
 
-/// Takes off a last sample that is the one before it once more, as some recorders write their end.
-pub fn last_twice(samples: &mut Vec<Values>) -> Option<Dropped> {
-    let [.., before, last] = samples.as_slice() else { return None };
-    let same = before.get(Id::Time).is_some() && before.get(Id::Time) == last.get(Id::Time);
-    same.then(|| samples.pop()).flatten().map(|last| Dropped {
-        row: last.place,
-        column: "time_s".into(),
-        text: last.get(Id::Time).unwrap_or_default().to_string(),
-        reason: "the last sample is there twice".into(),
-    })
+/// Refuses a position that turns back while the direction stays the same: the friction would have a wrong
+/// sign in every other leg.
+fn refuse_one_way(samples: &[Values], turns: &[usize]) -> Result<(), String> {
+    let ways: Vec<f64> = samples.iter().filter_map(|s| s.get(Id::Direction)).collect();
+    let one = ways.len() == samples.len() && ways.windows(2).all(|w| w[0] == w[1]);
+    let by_position = samples.iter().all(|s| s.get(Id::Position).is_some());
+    match turns {
+        [_, turn, .., _] if one && by_position => Err(format!(
+            "the position turns back {} times (first in row {}), but the direction is {} in every row: leave the direction out of --set and \
+             --map, the position gives it",
+            turns.len() - 2,
+            samples[*turn].place,
+            ways[0]
+        )),
+        _ => Ok(()),
+    }
+}
+
+/// Takes off what is no sample: rows in which a value is empty that most rows have, and a last sample that is
+/// the one before it once more, as some recorders write their end.
+pub fn unusable(samples: &mut Vec<Values>) -> Vec<Dropped> {
+    let known = |id: Id| samples.iter().filter(|s| s.get(id).is_some()).count();
+    let columns = [
+        Id::Time,
+        Id::Position,
+        Id::Velocity,
+        Id::NormalForce,
+        Id::LateralForce,
+        Id::FrictionForce,
+        Id::FrictionCoefficient,
+    ];
+    let needed: Vec<Id> = columns.into_iter().filter(|id| 2 * known(*id) > samples.len()).collect();
+    let drop = |s: &Values, id: Id, reason: &str| Dropped {
+        row: s.place,
+        column: id.target().column.into(),
+        text: s.get(id).map(|v| v.to_string()).unwrap_or_default(),
+        reason: reason.into(),
+    };
+    let empty = |s: &Values| needed.iter().copied().find(|id| s.get(*id).is_none());
+    let mut dropped: Vec<Dropped> =
+        samples.iter().filter_map(|s| Some(drop(s, empty(s)?, "empty"))).collect();
+    samples.retain(|s| empty(s).is_none());
+    if let [.., before, last] = samples.as_slice()
+        && last.get(Id::Time).is_some()
+        && before.get(Id::Time) == last.get(Id::Time)
+    {
+        dropped.push(drop(last, Id::Time, "the last sample is there twice"));
+        samples.pop();
+    }
+    dropped
 }
 
 /// What a stretch has besides its means.
@@ -319,3 +361,6 @@ fn mean(samples: &[Values], path: &[f64], times: &[f64]) -> (Values, Spread) {
     pass.put_motion(velocity.abs(), direction, average(samples, lateral));
     (pass, spread)
 }
+
+#[cfg(test)]
+mod tests;

@@ -101,8 +101,9 @@ impl Target {
     }
 }
 
-/// A header without case, blanks and marks.
+/// A header without case, blanks and marks. Letters that are not Latin stay: what they say is not known, so
+/// that no name may be found in the rest.
 pub fn plain(header: &str) -> String {
     let small = header.to_lowercase().replace(['µ', 'μ'], "mu");
-    small.chars().filter(char::is_ascii_alphanumeric).collect()
+    small.chars().filter(|c| c.is_alphanumeric()).collect()
 }

@@ -70,7 +70,7 @@ pub fn read(bytes: &[u8], marks: Marks) -> miette::Result<Grid> {
     };
     let rows = data.iter().map(|(place, line)| row(*place, line)).collect::<miette::Result<Vec<_>>>()?;
     let comments = remarks.iter().filter_map(|(place, line)| row(*place, line).ok()).collect();
-    let comma = decimal_comma(&rows, delimiter.unwrap_or('\n'), marks.decimal)?;
+    let comma = decimal_comma(&rows, marks.decimal)?;
     let mark = if comma { ", decimal commas" } else { "" };
     let format = format!("text, {encoding}, separated by {named}{mark}");
     let source = Source { format, comma, comments, places: false, blanks: delimiter == Some(' ') };
@@ -155,7 +155,7 @@ fn words(line: &str) -> Vec<String> {
 /// The words of a line that is to have `usual` cells: names may hold single blanks, and units in brackets behind one.
 fn regrouped(line: &str, usual: usize) -> Vec<String> {
     let plain = words(line);
-    if plain.len() <= usual || plain.iter().all(|w| is_number(w, ' ')) {
+    if plain.len() <= usual || plain.iter().all(|w| is_number(w)) {
         return plain;
     }
     let apart = line.replace('\t', "  ");
@@ -180,7 +180,7 @@ fn regrouped(line: &str, usual: usize) -> Vec<String> {
 
 /// Whether the lines are one number each, but for a header.
 fn one_column(lines: &[(u64, &str)]) -> bool {
-    let single = |line: &str| is_number(line, ' ');
+    let single = |line: &str| is_number(line);
     let numbers = lines.iter().filter(|(_, l)| single(l)).count();
     let before = lines.iter().take_while(|(_, l)| !single(l)).last();
     // Of a comma it is a decimal one only where a header of one name, or a point somewhere, says so.
@@ -194,13 +194,12 @@ fn one_column(lines: &[(u64, &str)]) -> bool {
 
 /// Whether every line is two whole numbers with a comma between.
 fn commas_are_decimal(lines: &[(u64, &str)]) -> bool {
-    lines.iter().all(|(_, l)| l.matches(',').count() == 1 && !l.contains('.') && is_number(l, ' '))
+    lines.iter().all(|(_, l)| l.matches(',').count() == 1 && !l.contains('.') && is_number(l))
 }
 
-/// Whether a cell is a number with either mark (a comma only where it does not part cells).
-fn is_number(cell: &str, delimiter: char) -> bool {
-    let point = if delimiter == ',' { cell.trim().to_string() } else { cell.trim().replacen(',', ".", 1) };
-    Unit::SI.apply(&point).is_some()
+/// Whether a cell is a number with either mark. A comma in a cell that commas separate was in quotes.
+fn is_number(cell: &str) -> bool {
+    Unit::SI.apply(&cell.trim().replacen(',', ".", 1)).is_some()
 }
 
 /// The usual number of cells of a line, and the lines as cells.
@@ -222,7 +221,7 @@ fn score(lines: &[(u64, &str)], remarks: &[(u64, String)], delimiter: char) -> f
     let (usual, split) = usual_width(lines, delimiter);
     let alike: Vec<&Vec<String>> = split.iter().filter(|c| c.len() == usual && usual > 1).collect();
     let cells = alike.iter().flat_map(|c| c.iter()).filter(|c| !c.trim().is_empty());
-    let number = |c: &String| is_number(c.trim().trim_end_matches('%'), delimiter) || is_time(&Cell::of(c));
+    let number = |c: &String| is_number(c.trim().trim_end_matches('%')) || is_time(&Cell::of(c));
     let numbers = cells.clone().filter(|c| number(c)).count();
     let count = cells.count().max(1);
     let mostly = |c: &Vec<String>| 2 * c.iter().filter(|c| number(c)).count() >= c.len();
@@ -240,12 +239,9 @@ fn score(lines: &[(u64, &str)], remarks: &[(u64, String)], delimiter: char) -> f
 }
 
 /// Whether the decimal mark is a comma: one stands where a point would, and no number has a point.
-fn decimal_comma(rows: &[Row], delimiter: char, stated: Option<char>) -> miette::Result<bool> {
+fn decimal_comma(rows: &[Row], stated: Option<char>) -> miette::Result<bool> {
     if let Some(mark) = stated {
         return Ok(mark == ',');
-    }
-    if delimiter == ',' {
-        return Ok(false);
     }
     let number_with = |mark: char| {
         rows.iter().find(|row| {
@@ -262,8 +258,55 @@ fn decimal_comma(rows: &[Row], delimiter: char, stated: Option<char>) -> miette:
             with_comma.place,
             with_point.place
         ),
-        (with_comma, _) => Ok(with_comma.is_some()),
+        (with_comma, with_point) => {
+            let mark = if with_comma.is_some() { ',' } else { '.' };
+            if with_comma.or(with_point).is_some() {
+                refuse_thousands(rows, mark)?;
+            }
+            Ok(with_comma.is_some())
+        }
     }
+}
+
+/// Refuses a mark that separates thousands as well as decimals: in one column every number with it has three
+/// digits behind it, the others are whole, and nearer to the thousands.
+fn refuse_thousands(rows: &[Row], mark: char) -> miette::Result<()> {
+    let wide = rows.iter().map(|r| r.cells.len()).max().unwrap_or(0);
+    for column in 0..wide {
+        // What stands above the table is not of its columns.
+        let broad = rows.iter().filter(|r| 2 * r.filled() >= wide);
+        let texts = broad.filter_map(|r| match r.cells.get(column)? {
+            Cell::Text(text) if is_number(text) => Some((r.place, text.as_str())),
+            _ => None,
+        });
+        let (marked, whole): (Vec<_>, Vec<_>) = texts.partition(|(_, text)| text.contains(mark));
+        let grouped = |text: &str| {
+            text.split_once(mark).is_some_and(|(head, tail)| {
+                let head = head.trim_start_matches(['-', '+']);
+                (1..=3).contains(&head.len())
+                    && !head.starts_with('0')
+                    && tail.len() == 3
+                    && tail.bytes().all(|b| b.is_ascii_digit())
+            })
+        };
+        let size = |text: &str| Unit::SI.apply(&text.replace(mark, ".")).map_or(0.0, f64::abs);
+        let largest = whole.iter().map(|(_, t)| size(t)).fold(0.0, f64::max);
+        let smallest = marked.iter().map(|(_, t)| size(t)).fold(f64::INFINITY, f64::min);
+        let Some((first, rest)) = marked.split_first() else { continue };
+        let all = grouped(first.1) && rest.iter().all(|(_, t)| grouped(t));
+        // As decimals they are further from the whole numbers than as thousands.
+        if all && largest < 1000.0 && largest * largest > 1000.0 * smallest * smallest {
+            miette::bail!(
+                help = format!(
+                    "say that it is a decimal mark (--decimal {mark}), or export the table without thousands separators"
+                ),
+                "line {}: '{}' stands in one column with whole numbers up to {largest}: decimals, or a separator of thousands",
+                first.0,
+                first.1
+            );
+        }
+    }
+    Ok(())
 }
 
 #[cfg(test)]
@@ -315,5 +358,32 @@ mod tests {
         assert!(read(text, Marks::default()).unwrap_err().to_string().contains("line 2"));
         let stated = read(text, Marks { decimal: Some(','), ..Marks::default() }).unwrap();
         assert!(stated.comma);
+    }
+
+    #[test]
+    fn a_mark_that_may_part_thousands_is_refused() {
+        for (text, mark) in [
+            ("t;F\n1;500\n2;750\n3;1.000\n4;1.250\n", '.'),
+            ("t;F\n1;500\n2;750\n3;1,000\n4;1,250\n", ','),
+            ("t,F\n1,500\n2,750\n3,1.000\n4,1.250\n", '.'),
+            ("t,F\n1,500\n2,750\n3,\"1,000\"\n4,\"1,250\"\n", ','),
+        ] {
+            let refused = read(text.as_bytes(), Marks::default()).unwrap_err();
+            assert!(refused.to_string().starts_with("line 4: '1"), "{text}: {refused}");
+            let stated = Marks { decimal: Some(mark), ..Marks::default() };
+            assert!(mark == ',' && text.contains('"') || read(text.as_bytes(), stated).is_ok(), "{text}");
+        }
+        for text in
+            ["t;F\n1;500\n2;0.750\n", "t;F\n1;2\n2;1.125\n", "t;F\n1;500\n2;1.25\n", "t;F\n1;1500\n2;1.250\n"]
+        {
+            assert!(read(text.as_bytes(), Marks::default()).is_ok(), "{text}");
+        }
+    }
+
+    #[test]
+    fn quoted_decimal_commas_are_read_beside_commas() {
+        for text in ["a,b\n\"1,5\",2\n-3,\"0,4\"\n", "\"a\",\"b\"\n\"1,5\",\"2,0\"\n\"-3,0\",\"0,4\"\n"] {
+            assert_eq!(numbers(&grid(text)), [[1.5, 2.0], [-3.0, 0.4]], "{text}");
+        }
     }
 }

@@ -156,7 +156,7 @@ impl Unit {
                 _ => None,
             },
             Dimension::Ratio => match text {
-                "" | "1" | "-" | "N/N" => Some(Unit::SI),
+                "" | "1" | "-" | "–" | "—" | "N/N" => Some(Unit::SI),
                 "%" => Some(Unit::ten(-2)),
                 _ => None,
             },
@@ -199,6 +199,10 @@ impl Unit {
     /// `mhz` megahertz, the readings that a tribometer can have.
     pub fn guess(dimension: Dimension, text: &str) -> Option<(String, Unit)> {
         let text = plain(text);
+        // A number in a header is a range or a setting, as in `Fz (5 N)`: only a map can state a factor.
+        if factored(&text).is_some() {
+            return None;
+        }
         let small = text.to_lowercase();
         let usual = match dimension {
             Dimension::Force => small.replace('n', "N"),

@@ -4,6 +4,10 @@ use super::grid::{Cell, Grid, Row};
 use super::head::Source;
 use miette::IntoDiagnostic;
 
+mod unfolded;
+
+use unfolded::{Percents, looked_through};
+
 /// Days, as workbooks count time, in s.
 const DAY_S: f64 = 86_400.0;
 
@@ -13,7 +17,7 @@ const DAY_S: f64 = 86_400.0;
 /// A file that is none, a sheet that is not there, several sheets and none named.
 pub fn read(bytes: &[u8], sheet: Option<&str>) -> miette::Result<Grid> {
     use calamine::Reader;
-    refuse_bombs(bytes)?;
+    let percents = looked_through(bytes)?;
     let mut book = calamine::open_workbook_auto_from_rs(std::io::Cursor::new(bytes)).into_diagnostic()?;
     let names = book.sheet_names();
     let named = match sheet {
@@ -22,7 +26,8 @@ pub fn read(bytes: &[u8], sheet: Option<&str>) -> miette::Result<Grid> {
         None => {
             let mut filled = Vec::new();
             for name in &names {
-                if sheet_rows(&mut book, name, bytes.len()).is_ok_and(|(rows, _)| !rows.is_empty()) {
+                if sheet_rows(&mut book, name, bytes.len(), &percents).is_ok_and(|(rows, _)| !rows.is_empty())
+                {
                     filled.push(name);
                 }
             }
@@ -41,7 +46,7 @@ pub fn read(bytes: &[u8], sheet: Option<&str>) -> miette::Result<Grid> {
             ),
         }
     };
-    let (rows, formulas) = sheet_rows(&mut book, &name, bytes.len())?;
+    let (rows, formulas) = sheet_rows(&mut book, &name, bytes.len(), &percents)?;
     // Numbers that were typed as text follow the mark of the country.
     let text_with_comma = |c: &Cell| matches!(c, Cell::Text(t) if t.contains(',') && !t.contains('.'));
     let comma = rows.iter().any(|r| {
@@ -57,6 +62,14 @@ pub fn read(bytes: &[u8], sheet: Option<&str>) -> miette::Result<Grid> {
             "{formulas} cells are formulas without a stored result: open the workbook in a spreadsheet program and save it there"
         ));
     }
+    let ratios = matches!(book, calamine::Sheets::Xls(_) | calamine::Sheets::Xlsb(_));
+    if ratios && grid.header.iter().chain(&grid.units).any(|text| text.contains('%')) {
+        grid.notes.push(
+            "which cells are shown in per cent is not read of .xls and .xlsb: 0.4 that is shown as 40 % is 0.4; if a column in % has such \
+             cells, save the workbook as .xlsx"
+                .into(),
+        );
+    }
     Ok(grid)
 }
 
@@ -65,6 +78,7 @@ fn sheet_rows(
     book: &mut calamine::Sheets<std::io::Cursor<&[u8]>>,
     name: &str,
     size: usize,
+    percents: &[Percents],
 ) -> miette::Result<(Vec<Row>, usize)> {
     use calamine::{Data, DataRef, Reader, Sheets};
     let cell = |data: Data| match data {
@@ -110,7 +124,12 @@ fn sheet_rows(
             let range = book.worksheet_range(name).into_diagnostic()?;
             let (top, left) = range.start().unwrap_or_default();
             for (row, column, value) in range.used_cells() {
-                sheet.put((top + row as u32, left + column as u32), cell(value.clone()))?;
+                let place = (top as usize + row, left as usize + column);
+                let value = match cell(value.clone()) {
+                    Cell::Number(v) if percents.iter().any(|p| p.holds(name, place)) => Cell::Percent(v),
+                    value => value,
+                };
+                sheet.put((place.0 as u32, place.1 as u32), value)?;
             }
         }
     }
@@ -163,90 +182,63 @@ impl Sheet {
     }
 }
 
-/// Refuses a packed workbook that unfolds to far more than it is, before its reader takes memory for that.
-fn refuse_bombs(bytes: &[u8]) -> miette::Result<()> {
-    use std::io::Read;
-    let number = |at: usize, n: usize| -> Option<usize> {
-        Some(bytes.get(at..at + n)?.iter().rev().fold(0, |all, b| all << 8 | usize::from(*b)))
-    };
-    let mut left = 48 * bytes.len() + (16 << 20);
-    // The directory stands at the end (PKWARE, APPNOTE 4.3.12): each entry names where its data begin.
-    let from = bytes.len().saturating_sub(65_557);
-    let Some(end) = bytes[from..].windows(4).rposition(|w| w == b"PK\x05\x06").map(|at| from + at) else {
-        return Ok(());
-    };
-    let mut at = number(end + 16, 4).unwrap_or(0);
-    let mut buffer = vec![0; 1 << 16];
-    while bytes.get(at..).is_some_and(|rest| rest.starts_with(b"PK\x01\x02")) {
-        let (Some(method), Some(packed), Some(local)) =
-            (number(at + 10, 2), number(at + 20, 4), number(at + 42, 4))
-        else {
-            break;
-        };
-        let start = local + 30 + number(local + 26, 2).unwrap_or(0) + number(local + 28, 2).unwrap_or(0);
-        if method == 8 {
-            let data = bytes.get(start..).unwrap_or_default();
-            let mut unfolded = flate2::read::DeflateDecoder::new(&data[..packed.min(data.len())]);
-            let mut repeated = Repeats::default();
-            while let Ok(n) = unfolded.read(&mut buffer) {
-                if n == 0 {
-                    break;
-                }
-                repeated.look(&buffer[..n]);
-                left = left.saturating_sub(n);
-                if left == 0 || repeated.cells > super::most_cells(bytes.len()) {
-                    miette::bail!(
-                        help = "save the sheet as CSV",
-                        "the workbook unfolds to far more than its {} bytes: it is damaged, or almost all of it is empty",
-                        bytes.len()
-                    );
-                }
-            }
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// A packed file of stored entries (PKWARE, APPNOTE 4.3).
+    fn packed(entries: &[(&str, &str)]) -> Vec<u8> {
+        let (mut file, mut directory) = (Vec::new(), Vec::new());
+        for (name, text) in entries {
+            let mut crc = flate2::Crc::new();
+            crc.update(text.as_bytes());
+            let (sum, size, start) =
+                (crc.sum().to_le_bytes(), (text.len() as u32).to_le_bytes(), file.len() as u32);
+            let length = (name.len() as u16).to_le_bytes();
+            let about = [&[20, 0, 0, 0, 0, 0, 0, 0, 0, 0][..], &sum, &size, &size, &length, &[0, 0]].concat();
+            file.extend([b"PK\x03\x04", &about[..], name.as_bytes(), text.as_bytes()].concat());
+            let place = start.to_le_bytes();
+            directory.extend([b"PK\x01\x02\x14\x00", &about[..], &[0; 10], &place, name.as_bytes()].concat());
         }
-        let lengths = [28, 30, 32].map(|k| number(at + k, 2).unwrap_or(0));
-        at += 46 + lengths.iter().sum::<usize>();
+        let (count, at) = ((entries.len() as u16).to_le_bytes(), (file.len() as u32).to_le_bytes());
+        let size = (directory.len() as u32).to_le_bytes();
+        file.extend(directory);
+        file.extend([b"PK\x05\x06", &[0; 4][..], &count, &count, &size, &at, &[0, 0]].concat());
+        file
     }
-    Ok(())
-}
 
-/// Cells that an OpenDocument sheet stands for by repeating few.
-#[derive(Default)]
-struct Repeats {
-    /// What was read and does not end with a whole tag.
-    rest: Vec<u8>,
-    /// How often the row that is open is repeated, its cells up to the last that holds something, and those behind.
-    row: (usize, usize, usize),
-    cells: usize,
-}
-
-impl Repeats {
-    fn look(&mut self, bytes: &[u8]) {
-        self.rest.extend_from_slice(bytes);
-        let whole = self.rest.iter().rposition(|b| *b == b'>').map_or(0, |at| at + 1);
-        let text: Vec<u8> = self.rest.drain(..whole).collect();
-        // What is one tag of more than this is not a tag.
-        if self.rest.len() > 1 << 16 {
-            self.rest.clear();
-        }
-        let text = String::from_utf8_lossy(&text);
-        for tag in text.split('<').filter(|t| t.starts_with("table:table-")) {
-            let times = |name: &str| {
-                let value = tag.split_once(name)?.1.split_once('"')?.1;
-                value.split('"').next()?.parse::<usize>().ok()
-            };
-            if tag.starts_with("table:table-row") {
-                self.row = (times("number-rows-repeated").unwrap_or(1), 0, 0);
-            } else if tag.starts_with("table:table-cell") {
-                let count = times("number-columns-repeated").unwrap_or(1);
-                let (rows, filled, empty) = self.row;
-                if tag.contains("office:") {
-                    let more = empty.saturating_add(count);
-                    self.row = (rows, filled.saturating_add(more), 0);
-                    self.cells = self.cells.saturating_add(rows.saturating_mul(more));
-                } else {
-                    self.row.2 = empty.saturating_add(count);
-                }
-            }
-        }
+    #[test]
+    fn per_cent_cells_of_opendocument_are_the_ratios_that_they_show() {
+        let cell = |kind: &str, value: &str| {
+            format!(
+                "<table:table-cell office:value-type=\"{kind}\" office:value=\"{value}\"><text:p>{value}</text:p></table:table-cell>"
+            )
+        };
+        let name = |text: &str| {
+            format!(
+                "<table:table-cell office:value-type=\"string\"><text:p>{text}</text:p></table:table-cell>"
+            )
+        };
+        let row = |cells: &[String]| format!("<table:table-row>{}</table:table-row>", cells.concat());
+        let rows = [
+            row(&[name("t (s)"), name("COF (%)")]),
+            row(&[cell("float", "1"), cell("percentage", "0.4")]),
+            row(&[cell("float", "2"), cell("percentage", "0.5")]),
+            row(&[cell("float", "3"), cell("float", "0.6")]),
+        ];
+        let content = format!(
+            "<?xml version=\"1.0\"?><office:document-content xmlns:office=\"urn:oasis:names:tc:opendocument:xmlns:office:1.0\" \
+             xmlns:table=\"urn:oasis:names:tc:opendocument:xmlns:table:1.0\" \
+             xmlns:text=\"urn:oasis:names:tc:opendocument:xmlns:text:1.0\"><office:body><office:spreadsheet>\
+             <table:table table:name=\"A &amp; B\">{}</table:table></office:spreadsheet></office:body></office:document-content>",
+            rows.concat()
+        );
+        let kind = "application/vnd.oasis.opendocument.spreadsheet";
+        let manifest = "<?xml version=\"1.0\"?><manifest:manifest xmlns:manifest=\"urn:oasis:names:tc:opendocument:xmlns:manifest:1.0\"/>";
+        let book =
+            packed(&[("mimetype", kind), ("content.xml", &content), ("META-INF/manifest.xml", manifest)]);
+        let grid = read(&book, None).unwrap();
+        let second: Vec<Cell> = grid.rows.iter().map(|r| r.cells[1].clone()).collect();
+        assert_eq!(second, [Cell::Percent(0.4), Cell::Percent(0.5), Cell::Number(0.6)]);
     }
 }

@@ -183,6 +183,7 @@ fn a_point_that_no_rig_can_have_is_refused() {
         (["point", "--amplitude-pp-m", "2"], "\u{b5}m meant? Then write 2e-6"),
         (["point", "--speed-m-s", "20"], "mm/s meant? Then write 2e-2"),
         (["point", "--normal-force-n", "5000"], "0 to 1000 N"),
+        (["point", "--frequency-hz", "27.5"], "kHz meant? Then write 2.75e4"),
         (["ridge", "--amplitude-pp-m", "2"], "\u{b5}m meant?"),
     ] {
         let ended = point(&words);
@@ -192,5 +193,7 @@ fn a_point_that_no_rig_can_have_is_refused() {
     }
     let said = done(&point(&["point"]));
     assert!(said.contains("mu' = 0.29") && !said.contains("+-"), "{said}");
-    assert!(done(&point(&["point", "--model", "surrogate"])).contains("\u{b1}"));
+    let law = |load: &str| done(&point(&["point", "--model", "surrogate", "--normal-force-n", load]));
+    assert!(law("0.25").contains("\u{b1}") && !law("0.25").contains("an extrapolation"));
+    assert!(law("5").contains("an extrapolation"));
 }

@@ -4,7 +4,9 @@ use clap::Args;
 use models::condition::Condition;
 use models::quantity::PeakToPeak;
 use models::ridge::{RidgeCase, case};
-use runs::input::unit_meant;
+use realtime::safety::HARD;
+use runs::input::{unit_meant, unit_of};
+use runs::report::human::quantity;
 
 /// One operating point. Defaults are the paper's nominal case.
 #[derive(Args, Clone, Debug)]
@@ -55,13 +57,14 @@ impl ContactArgs {
     }
 }
 
-/// What a flag may be at most on any rig that vibrates a plate under a finger. The models answer for larger values too, and mean nothing.
-const LARGEST: [(&str, f64); 5] = [
-    ("amplitude_pp_m", 1e-4),
-    ("frequency_hz", 1e7),
-    ("speed_m_s", 10.0),
-    ("normal_force_n", 1000.0),
-    ("mu0", 10.0),
+/// What a flag may be on any rig that vibrates a plate under a finger. The models answer for other values
+/// too, and mean nothing.
+const RANGES: [(&str, [f64; 2]); 5] = [
+    ("amplitude_pp_m", [0.0, 1e-4]),
+    ("frequency_hz", [HARD.frequency_hz.0, HARD.frequency_hz.1]),
+    ("speed_m_s", [0.0, 10.0]),
+    ("normal_force_n", [0.0, 1000.0]),
+    ("mu0", [0.0, 10.0]),
 ];
 
 impl ConditionArgs {
@@ -71,13 +74,15 @@ impl ConditionArgs {
     /// The flag, its value, what is allowed, and the unit that was probably meant.
     pub fn check(&self) -> Result<(), String> {
         let values = [self.amplitude_pp_m, self.frequency_hz, self.speed_m_s, self.normal_force_n, self.mu0];
-        for ((key, largest), value) in LARGEST.into_iter().zip(values) {
-            if value > largest {
-                let meant = unit_meant(key, value, [1e-6 * largest, largest]);
+        for ((key, [least, largest]), value) in RANGES.into_iter().zip(values) {
+            if value > largest || value > 0.0 && value < least {
+                let meant = unit_meant(key, value, [least.max(1e-6 * largest), largest]);
                 let hint = meant.map_or_else(String::new, |meant| format!(" ({meant})"));
-                let most = runs::report::human::quantity(largest, runs::input::unit_of(key));
+                let unit = unit_of(key);
+                let [least, most] =
+                    [least, largest].map(|v| if v == 0.0 { "0".into() } else { quantity(v, unit) });
                 return Err(format!(
-                    "--{} {value}: no rig has that; give 0 to {most}{hint}",
+                    "--{} {value}: no rig has that; give {least} to {most}{hint}",
                     key.replace('_', "-")
                 ));
             }
@@ -109,6 +114,30 @@ impl ConditionArgs {
             mean_pressure_pa: mean_pressure_pa
                 .unwrap_or_else(|| case::hertz_mean_pressure_pa(self.normal_force_n)),
             ..RidgeCase::paper()
+        }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use clap::Parser;
+
+    #[derive(Parser)]
+    struct Flags {
+        #[command(flatten)]
+        condition: ConditionArgs,
+    }
+
+    /// 27.5 Hz gave a mu' of a plate that no drive moves so slowly.
+    #[test]
+    fn a_frequency_that_no_rig_has_is_refused_with_the_unit_that_was_meant() {
+        let check = |hz: &str| Flags::parse_from(["mu", "--frequency-hz", hz]).condition.check();
+        let why = check("27.5").unwrap_err();
+        assert!(why.contains("give 5 kHz to 120 kHz (27.5 Hz: kHz meant? Then write 2.75e4"), "{why}");
+        assert!(check("2.75e7").unwrap_err().ends_with("give 5 kHz to 120 kHz"));
+        for hz in ["5000", "27500", "120000"] {
+            check(hz).unwrap();
         }
     }
 }

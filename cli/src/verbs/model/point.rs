@@ -144,6 +144,9 @@ pub fn run(args: &PointArgs, json: bool) -> miette::Result<ExitCode> {
             100.0 * answer.contact_fraction,
             answer.phase_shift_deg
         );
+        if answer.validity == models::prediction::Validity::Extrapolated {
+            out!("  outside the range that the law was made for: an extrapolation");
+        }
         for read in &answer.readings {
             out!(
                 "  where {}: mu' = {:.3} \u{b1} {:.3}",

@@ -2,7 +2,7 @@
 
 use super::{Args, Watching, job_of, measure, new_name};
 use miette::IntoDiagnostic;
-use runs::campaign::claims::Claim;
+
 use runs::campaign::{self, Campaign};
 use runs::catalogue::runs_folder;
 use runs::print::answer_json;
@@ -10,6 +10,7 @@ use runs::say;
 use runs::session::Job;
 use std::path::{Path, PathBuf};
 use std::process::ExitCode;
+use studies::campaign::claims::Claim;
 
 /// The page of a campaign, in its folder.
 pub const PAGE: &str = "campaign.html";
@@ -30,8 +31,11 @@ pub fn run(mut args: Args, text: &str, folder: &Path, json: bool) -> miette::Res
     let file = resumed
         .as_ref()
         .map_or_else(|| args.plan.clone(), |of| of.join(campaign::FILE).display().to_string());
-    let campaign =
-        Campaign::parse(&file, text, folder).map_err(|why| tables::check::refusal(why, &file, "campaign"))?;
+    let campaign = Campaign::parse(&file, text, folder).map_err(|why| match &resumed {
+        // Its plan and setups are not beside the text, where a check would look for them.
+        Some(_) => why,
+        None => tables::check::refusal(why, &file, "campaign"),
+    })?;
     let out =
         args.out.take().or(resumed).unwrap_or_else(|| runs_folder().join(new_name(&campaign.file.name)));
     let given = args.clone();
@@ -92,8 +96,8 @@ pub fn run(mut args: Args, text: &str, folder: &Path, json: bool) -> miette::Res
 /// # Errors
 /// A folder that holds no campaign, or cannot be written.
 pub fn write(folder: &Path) -> miette::Result<(Vec<Claim>, usize, usize)> {
-    let (file, made) = campaign::measured(folder)?;
-    let (html, claims) = campaign::page(&file, &made)?;
+    let (file, made) = studies::campaign::measured(folder)?;
+    let (html, claims) = studies::campaign::page(&file, &made)?;
     runs::files::write_plain(&folder.join(PAGE), html)?;
     let answers = serde_json::to_vec_pretty(&claims).into_diagnostic()?;
     runs::files::write_plain(&folder.join("claims.json"), answers)?;

@@ -20,8 +20,15 @@ pub struct Harmonic {
     pub phase: f64,
 }
 
+/// Mean friction as a share of that without the harmonic. Both are taken by the same steps, so that a small
+/// harmonic changes little.
+pub fn friction_ratio(c: &Contact) -> f64 {
+    let plain = by_steps(&Contact { harmonic: Harmonic { ratio: 0.0, phase: 0.0 }, ..*c });
+    if plain > 0.0 { by_steps(c) / plain } else { 1.0 }
+}
+
 /// Mean friction over the periodic steady state, N.
-pub fn mean_friction(c: &Contact) -> f64 {
+fn by_steps(c: &Contact) -> f64 {
     let steps = if c.coarse { COARSE_STEPS } else { STEPS };
     let step = 2.0 * PI / steps as f64;
     let mut room = [0.0; STEPS];
@@ -87,7 +94,7 @@ mod tests {
     }
 
     fn with(ratio: f64, phase: f64, c: &Contact) -> f64 {
-        mean_friction(&Contact { harmonic: Harmonic { ratio, phase }, ..*c })
+        by_steps(&Contact { harmonic: Harmonic { ratio, phase }, ..*c })
     }
 
     #[test]

@@ -25,6 +25,8 @@ pub(super) static EFFECT: Effect = Effect {
                 Parameter::signed("log_normal_factor", "1", 0.5, -2.0, 2.0),
                 Parameter::signed("growth_per_e_fold_of_load", "1", 0.3, -1.0, 1.0).bending(),
                 Parameter::signed("lateral_over_normal_e_folds", "1", 0.3, -1.0, 1.0).bending(),
+                // Skin has a grain, in springs that are wrong both ways, too.
+                Parameter::signed("lateral_forward_e_folds", "1", 0.1, -1.0, 1.0).bending(),
             ],
         ),
         Law::new("both, growing with the load", &[Parameter::signed("load_exponent", "1", 0.25, -0.7, 1.0)])
@@ -47,7 +49,7 @@ pub(super) static EFFECT: Effect = Effect {
             2 => [theta[0]; 2],
             3 => {
                 let normal = theta[0] * (1.0 + theta[1] * load_e_folds);
-                [normal, normal * (1.0 + theta[2])]
+                [normal, normal * (1.0 + theta[2]) + theta[0] * theta[3] * pass.direction.sign()]
             }
             5 => [0.0, theta[0] * pass.direction.sign()],
             _ => [theta[0] * load_e_folds; 2],

@@ -63,6 +63,21 @@ fn a_trip_is_told_in_its_unit() {
     assert!(text.contains("2000000 Hz (limit "), "{text}");
 }
 
+/// '0 m (limit 0.2 um)': the reader had to convert to compare.
+#[test]
+fn value_and_limit_of_a_trip_have_one_unit() {
+    let trip = tripped(Request::default(), |seen| seen.forces.lateral = Err(NoData::Disconnected));
+    for (value, bound, words) in [
+        (0.0, 2e-10, ": 0 \u{b5}m (limit 0.0002 \u{b5}m)"),
+        (1e-4, 0.02, ": 0.0001 m (limit 0.02 m)"),
+        (f64::INFINITY, 2e-6, ": no data (limit 2 \u{b5}m)"),
+        (0.0, 0.0, ": 0 m (limit 0 m)"),
+    ] {
+        let text = Trip { unit: Unit::Metre, value, bound, ..trip }.to_string();
+        assert!(text.contains(words), "{text}");
+    }
+}
+
 #[test]
 fn a_trip_of_an_older_record_is_read() {
     let old = r#"{"cause":"over_travel","value":0.1,"bound":0.05,"cycle":7,"at":7000000}"#;

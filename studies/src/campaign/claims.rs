@@ -5,11 +5,11 @@
 //! contradicted by that, never by a difference that is merely not significant.
 
 use super::measured::{Effect, Measured, contrast, ends, mean};
-use crate::fingertip::FingertipKind;
-use crate::report::human::number;
 use models::covariate::{self, Covariate};
 use models::prediction::{EmpiricalPsi, FrictionModel, SpringSlider, Validity};
 use models::surrogate::Surrogate;
+use runs::fingertip::FingertipKind;
+use runs::report::human::number;
 use serde::Serialize;
 
 /// What a statement expects of a change, or what was found.

@@ -4,16 +4,16 @@
 //! computed in each session by itself, as a difference between the ends of a factor's range at otherwise
 //! equal settings, and its interval is Student's over sessions.
 
-use super::Session;
-use crate::fingertip::FingertipKind;
-use crate::report::levels::Levels;
-use crate::sequence::MeasuredPass;
 use models::condition::Condition;
 use models::covariate::{self, Covariate};
 use models::finger::Finger;
 use models::pass::{Pass, coulomb_coefficient};
 use models::prediction::Regime;
 use models::quantity::PeakToPeak;
+use runs::campaign::Session;
+use runs::fingertip::FingertipKind;
+use runs::report::levels::Levels;
+use runs::sequence::MeasuredPass;
 use statrs::distribution::{ContinuousCDF, StudentsT};
 use std::collections::BTreeMap;
 

@@ -2,16 +2,16 @@
 
 use super::claims::{Claim, Trend, claims};
 use super::measured::{Driven, FACTORS, Measured, ends, groups, mean};
-use super::{CampaignFile, sessions};
-use crate::report::html::{escape, head, list, note, shell, table};
-use crate::report::human::number;
-use crate::report::plots::campaign::{Series, against, against_psi};
-use crate::report::plots::mark_name;
 use models::condition::Condition;
 use models::covariate::Covariate;
 use models::prediction::{FrictionModel, SpringSlider};
 use models::psi::PsiEq17;
 use models::surrogate::Surrogate;
+use runs::campaign::{CampaignFile, sessions};
+use runs::report::html::{escape, head, list, note, shell, table};
+use runs::report::human::number;
+use runs::report::plots::campaign::{Series, against, against_psi};
+use runs::report::plots::mark_name;
 use std::fmt::Write;
 
 /// Points of a model's curve.
@@ -98,7 +98,7 @@ fn methods(file: &CampaignFile, made: &[Measured]) -> String {
     )
 }
 
-fn cell_words(cell: &super::Cell) -> String {
+fn cell_words(cell: &runs::campaign::Cell) -> String {
     let tip = cell.tip.as_deref().map(|tip| format!(", {tip}")).unwrap_or_default();
     let condition = if cell.condition.is_empty() { String::new() } else { format!(", {}", cell.condition) };
     format!("{} ({}{tip}{condition})", cell.name, cell.setup)
@@ -230,7 +230,7 @@ fn collapse(file: &CampaignFile, made: &[Measured]) -> miette::Result<String> {
 }
 
 fn session_table(file: &CampaignFile, made: &[Measured]) -> String {
-    let row = |session: super::Session| {
+    let row = |session: runs::campaign::Session| {
         let done = made.iter().find(|s| s.session.number == session.number);
         let (state, mu0, passes) = match done {
             None => ("to be made", String::new(), String::new()),

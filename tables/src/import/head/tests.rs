@@ -1,0 +1,62 @@
+//! Rows between and below those of a table.
+
+use crate::import::guess::tests::{imported, table};
+
+const HEAD: &str = "t (s);v (mm/s);Fz (N);Fx (N)";
+
+fn whole() -> String {
+    table(HEAD, "{t};{v};0.25;{fx}")
+}
+
+#[test]
+fn rows_that_sum_others_up_are_no_passes() {
+    let named = table("Probe;v (mm/s);Fz (N);Fx (N)", "P{k};{v};0.25;{fx}");
+    let text = format!("{named}Mittelwert;20;0.25;0.1\nStd.-Abw.;1;0.01;0.01\nMax;20;0.25;0.1\n");
+    let log = imported(&text, "", "amplitude_pp=0,time_s=rows", false).unwrap().log;
+    let told: Vec<(u64, &str)> = log.dropped.iter().map(|d| (d.row, d.reason.as_str())).collect();
+    assert_eq!(log.passes, 24);
+    assert_eq!(told[1], (27, "'Std.-Abw.' sums up other rows: no pass"));
+    assert_eq!(told.len(), 3);
+}
+
+#[test]
+fn other_units_end_a_table() {
+    let below = "s;m/s;mN;mN\n60;0.02;250;100\n62;-0.02;250;-100\n";
+    let log = imported(&format!("{}{below}", whole()), "", "amplitude_pp=0", false).unwrap().log;
+    assert_eq!(log.passes, 24);
+    assert_eq!(log.dropped.iter().map(|d| d.row).collect::<Vec<_>>(), [26, 27, 28]);
+    assert!(log.dropped[1].reason.starts_with("below row 26, which states other units"), "{:?}", log.dropped);
+    // The same units say nothing new.
+    let below = "s;mm/s;N;N\n60;20;0.25;0.1\n";
+    let log = imported(&format!("{}{below}", whole()), "", "amplitude_pp=0", false).unwrap().log;
+    assert_eq!(log.passes, 25);
+}
+
+#[test]
+fn a_header_that_is_not_known_ends_a_table() {
+    let below = "Kanal A;Kraft B;Weg C;Hub D\n60;20;250;100\n62;-20;250;-100\n";
+    let log = imported(&format!("{}{below}", whole()), "", "amplitude_pp=0", false).unwrap().log;
+    assert_eq!(log.passes, 24);
+    let reason = &log.dropped[2].reason;
+    assert!(reason.starts_with("below the words of row 26, which name no column"), "{reason}");
+    // Failed readings are no header, and a known header begins the table again.
+    let below = "OVL;OVL;OVL;OVL\n60;20;0.25;0.1\n";
+    let log = imported(&format!("{}{below}", whole()), "", "amplitude_pp=0", false).unwrap().log;
+    assert_eq!((log.passes, log.dropped.len()), (25, 1));
+    let again = format!("{}a;b;c;d\n60;20;0.25;0.1\n{HEAD}\n62;-20;0.25;-0.1\n", whole());
+    let log = imported(&again, "", "amplitude_pp=0", false).unwrap().log;
+    assert_eq!((log.passes, log.dropped.len()), (25, 2));
+}
+
+#[test]
+fn a_word_and_its_value_above_a_narrow_table_are_no_data() {
+    for before in ["Load [N];5\n", "Sample;A12\nLoad [N];0.25\nRate [Hz];10\n", "Load [N];5\n\n"] {
+        let text = format!("{before}{}", table("t (s);COF", "{t};{mu}"));
+        let set = "amplitude_pp=0,speed=20:mm/s,direction=1,normal_force=5";
+        let log = imported(&text, "", set, false).unwrap_or_else(|e| panic!("{before}: {e}")).log;
+        assert_eq!(log.passes, 24, "{before}");
+        assert!(
+            log.notes.concat().contains("before the header was passed over: Load [N] 5") || before.len() > 12
+        );
+    }
+}

@@ -1,0 +1,88 @@
+//! What is doubtful in a map: columns that were left open; signs, units and amplitudes that it takes
+//! otherwise than the source says. Nothing is repaired.
+
+use super::{Map, Taken, unit_row};
+use crate::import::clock::is_time;
+use crate::import::grid::{Cell, Grid, Row};
+use crate::import::guess::{open_unit, stroke, unit_of};
+use crate::import::targets::{ColumnKind, Id, TARGETS};
+use crate::import::units::Unit;
+
+/// Why columns with a name of that column of the point table were not guessed.
+pub(super) fn open(map: &Map, grid: &Grid, column: &str) -> String {
+    let why = |k: usize| {
+        let (target, unit) = open_unit(grid, k).filter(|(target, _)| TARGETS[*target].column == column)?;
+        let (name, header) = (TARGETS[target].name, &grid.header[k]);
+        Some(format!("; '{header}' was left open: '{unit}' is not a unit of {name} that a header can state"))
+    };
+    let free = (0..grid.header.len()).filter(|k| !map.columns.iter().any(|c| c.index == *k));
+    free.filter_map(why).collect()
+}
+
+/// The refusal of a magnitude that has both signs in many rows: it would turn with the direction twice.
+pub(super) fn signed(column: &Taken, grid: &Grid) -> Option<String> {
+    let remedy = match column.target {
+        t if t == Id::FrictionForce as usize => "map it as lateral_force",
+        t if t == Id::FrictionCoefficient as usize => {
+            "map its product with the normal force as lateral_force (under a constant load of 5 N: HEADER=lateral_force:5N)"
+        }
+        _ => return None,
+    };
+    let value = |r: &Row| match grid.cell(r, column.index)? {
+        Cell::Percent(ratio) => Some(*ratio),
+        cell => Unit::SI.apply(cell.digits(grid.comma)?.trim_end_matches(['%', ' '])),
+    };
+    let values: Vec<f64> = grid.rows.iter().filter_map(value).filter(|v| *v != 0.0).collect();
+    let below = values.iter().filter(|v| **v < 0.0).count();
+    let (few, name) = (below.min(values.len() - below), TARGETS[column.target].name);
+    (few > 0 && 5 * few >= values.len()).then(|| {
+        format!(
+            "{}: {below} of {} values are negative, and {name} is a magnitude without a sign: if the sign is that of the sensor, {remedy}",
+            column.header,
+            values.len()
+        )
+    })
+}
+
+/// What the map says otherwise than the source, and what it assumes, in sentences. A sign is no other unit.
+pub fn contradicted(map: &Map, grid: &Grid) -> Vec<String> {
+    let size = |unit: &Unit| (unit.factor().abs(), unit.offset().abs());
+    let words = "the map was taken: correct it if the header is right";
+    let unit = |c: &Taken| {
+        let (text, unit) = unit_of(grid, c.index, c.target)?;
+        let both = format!("{}: the header says {text}, the map says {}; {words}", c.header, c.unit_text);
+        (size(&unit) != size(&c.unit)).then_some(both)
+    };
+    let counted = |c: &Taken| {
+        let row = || unit_row(&grid.units, c.index).and_then(stroke);
+        let says = stroke(&grid.header[c.index]).or_else(row)? as usize;
+        let other = says != c.target && TARGETS[c.target].column == Id::AmplitudePp.target().column;
+        let (says, taken) = (TARGETS[says].name, TARGETS[c.target].name);
+        other.then(|| format!("{}: the header says {says}, the map says {taken}; {words}", c.header))
+    };
+    let assumed = |c: &Taken| {
+        // A clock's times have their unit.
+        let clock = grid.rows.iter().any(|r| grid.cell(r, c.index).is_some_and(is_time));
+        let number = matches!(TARGETS[c.target].kind, ColumnKind::Number(_)) && !clock;
+        (c.assumed && number).then(|| format!("{}: no unit stated, {} assumed", c.header, c.unit_text))
+    };
+    let of_column =
+        |c: &Taken| [unit(c), counted(c), assumed(c), nameless(c, grid)].into_iter().flatten().collect();
+    map.columns.iter().flat_map(|c| -> Vec<String> { of_column(c) }).collect()
+}
+
+/// Rows without the name of a run, where others have one.
+fn nameless(column: &Taken, grid: &Grid) -> Option<String> {
+    let rows: Vec<&Row> = grid.rows.iter().filter(|r| r.block == 0).collect();
+    let bare = |r: &&&Row| grid.cell(r, column.index).is_none_or(|cell| *cell == Cell::Empty);
+    let first = rows.iter().find(bare).filter(|_| column.target == Id::Run as usize)?;
+    let count = rows.iter().filter(bare).count();
+    (count < rows.len()).then(|| {
+        format!(
+            "{}: {count} of {} rows name no run (first row {}); if the name above holds for them, repeat it in every row of the source",
+            column.header,
+            rows.len(),
+            first.place
+        )
+    })
+}

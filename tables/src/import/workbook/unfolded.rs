@@ -1,0 +1,137 @@
+//! A packed workbook before its reader takes it: how much it unfolds to, and which cells of OpenDocument
+//! are in per cent.
+
+/// Looks through a packed workbook: refuses one that unfolds to far more than it is, before its reader takes
+/// memory for that, and finds the cells of OpenDocument that are in per cent.
+pub(super) fn looked_through(bytes: &[u8]) -> miette::Result<Vec<Percents>> {
+    use std::io::Read;
+    let number = |at: usize, n: usize| -> Option<usize> {
+        Some(bytes.get(at..at + n)?.iter().rev().fold(0, |all, b| all << 8 | usize::from(*b)))
+    };
+    let mut left = 48 * bytes.len() + (16 << 20);
+    let mut percents = Vec::new();
+    // The directory stands at the end (PKWARE, APPNOTE 4.3.12): each entry names where its data begin.
+    let from = bytes.len().saturating_sub(65_557);
+    let Some(end) = bytes[from..].windows(4).rposition(|w| w == b"PK\x05\x06").map(|at| from + at) else {
+        return Ok(percents);
+    };
+    let mut at = number(end + 16, 4).unwrap_or(0);
+    let mut buffer = vec![0; 1 << 16];
+    while bytes.get(at..).is_some_and(|rest| rest.starts_with(b"PK\x01\x02")) {
+        let (Some(method), Some(packed), Some(local)) =
+            (number(at + 10, 2), number(at + 20, 4), number(at + 42, 4))
+        else {
+            break;
+        };
+        let start = local + 30 + number(local + 26, 2).unwrap_or(0) + number(local + 28, 2).unwrap_or(0);
+        if method == 8 || method == 0 {
+            let data = bytes.get(start..).unwrap_or_default();
+            let data = &data[..packed.min(data.len())];
+            let mut unfolded: Box<dyn Read> =
+                if method == 8 { Box::new(flate2::read::DeflateDecoder::new(data)) } else { Box::new(data) };
+            let mut repeated = Repeats { percents, ..Repeats::default() };
+            while let Ok(n) = unfolded.read(&mut buffer) {
+                if n == 0 {
+                    break;
+                }
+                repeated.look(&buffer[..n]);
+                left = left.saturating_sub(n);
+                if left == 0 || repeated.cells > crate::import::most_cells(bytes.len()) {
+                    miette::bail!(
+                        help = "save the sheet as CSV",
+                        "the workbook unfolds to far more than its {} bytes: it is damaged, or almost all of it is empty",
+                        bytes.len()
+                    );
+                }
+            }
+            percents = repeated.percents;
+        }
+        let lengths = [28, 30, 32].map(|k| number(at + k, 2).unwrap_or(0));
+        at += 46 + lengths.iter().sum::<usize>();
+    }
+    Ok(percents)
+}
+
+/// Cells of an OpenDocument sheet that are in per cent: from and to, of rows and of columns.
+pub(super) struct Percents {
+    sheet: String,
+    rows: (usize, usize),
+    columns: (usize, usize),
+}
+
+impl Percents {
+    pub(super) fn holds(&self, sheet: &str, (row, column): (usize, usize)) -> bool {
+        let within = |(from, to): (usize, usize), at| from <= at && at < to;
+        self.sheet == sheet && within(self.rows, row) && within(self.columns, column)
+    }
+}
+
+/// Cells that an OpenDocument sheet stands for by repeating few.
+#[derive(Default)]
+struct Repeats {
+    /// What was read and does not end with a whole tag.
+    rest: Vec<u8>,
+    /// How often the row that is open is repeated, its cells up to the last that holds something, and those
+    /// behind.
+    row: (usize, usize, usize),
+    cells: usize,
+    /// The sheet that is open, and its rows so far with those that are open.
+    sheet: String,
+    rows: usize,
+    percents: Vec<Percents>,
+}
+
+impl Repeats {
+    /// Cells of the open row, which begins at row `from`: the same columns in row after row are one.
+    fn put_percents(&mut self, from: usize, columns: (usize, usize)) {
+        let goes_on = |p: &&mut Percents| p.rows.1 == from && p.columns == columns && p.sheet == self.sheet;
+        match self.percents.iter_mut().rev().take(64).find(goes_on) {
+            Some(above) => above.rows.1 = self.rows,
+            None => {
+                let (sheet, rows) = (self.sheet.clone(), (from, self.rows));
+                self.percents.push(Percents { sheet, rows, columns });
+            }
+        }
+    }
+
+    fn look(&mut self, bytes: &[u8]) {
+        self.rest.extend_from_slice(bytes);
+        let whole = self.rest.iter().rposition(|b| *b == b'>').map_or(0, |at| at + 1);
+        let text: Vec<u8> = self.rest.drain(..whole).collect();
+        // What is one tag of more than this is not a tag.
+        if self.rest.len() > 1 << 16 {
+            self.rest.clear();
+        }
+        let text = String::from_utf8_lossy(&text);
+        for tag in text.split('<').filter(|t| t.starts_with("table:")) {
+            let value = |name: &str| {
+                let value = tag.split_once(name)?.1.split_once('"')?.1;
+                value.split('"').next()
+            };
+            let times = |name: &str| value(name)?.parse::<usize>().ok();
+            if tag.starts_with("table:table ") {
+                let name = value("table:name").unwrap_or_default();
+                let marks = [("&lt;", "<"), ("&gt;", ">"), ("&quot;", "\""), ("&apos;", "'"), ("&amp;", "&")];
+                self.sheet = marks.iter().fold(name.to_string(), |n, (from, to)| n.replace(from, to));
+                self.rows = 0;
+            } else if tag.starts_with("table:table-row") {
+                let count = times("number-rows-repeated").unwrap_or(1);
+                (self.row, self.rows) = ((count, 0, 0), self.rows.saturating_add(count));
+            } else if tag.starts_with("table:covered-table-cell") || tag.starts_with("table:table-cell") {
+                let count = times("number-columns-repeated").unwrap_or(1);
+                let (rows, filled, empty) = self.row;
+                if value("office:value-type") == Some("percentage") {
+                    let from = filled.saturating_add(empty);
+                    self.put_percents(self.rows.saturating_sub(rows), (from, from.saturating_add(count)));
+                }
+                if tag.contains("office:") {
+                    let more = empty.saturating_add(count);
+                    self.row = (rows, filled.saturating_add(more), 0);
+                    self.cells = self.cells.saturating_add(rows.saturating_mul(more));
+                } else {
+                    self.row.2 = empty.saturating_add(count);
+                }
+            }
+        }
+    }
+}
