@@ -1,7 +1,7 @@
 //! What of a run's folder is no longer what was written.
 
 use super::lines::{whole_passes, whole_table};
-use super::{JOURNAL, POINTS, is_held, passes_in, records_in, sessions_in};
+use super::{IDENTITY, JOURNAL, POINTS, is_held, passes_in, records_in, sessions_in};
 use crate::sequence::MeasuredPass;
 use miette::{Context, IntoDiagnostic};
 use std::collections::BTreeSet;
@@ -23,7 +23,8 @@ pub fn damage_in(path: &Path) -> miette::Result<Vec<String>> {
         findings.extend(found.sentences().iter().map(|s| of_file(&record, s)));
     }
     findings.extend(missing_records(path)?);
-    if path.join(POINTS).exists() || path.join(JOURNAL).exists() {
+    // A folder that `import` made has a table and no run.
+    if path.join(JOURNAL).exists() || path.join(IDENTITY).exists() && path.join(POINTS).exists() {
         match passes_in(path) {
             Ok(passes) => findings.extend(differences(path, &passes)?),
             Err(why) => findings.push(format!("{why:#}")),
@@ -67,4 +68,17 @@ pub fn differences(path: &Path, passes: &[MeasuredPass]) -> miette::Result<Vec<S
         findings.push(format!("{lost} {passes} of {JOURNAL} {are} not in {POINTS}"));
     }
     Ok(findings)
+}
+
+#[cfg(test)]
+mod tests {
+    /// A table that `import` wrote was called damaged: it has no journal.
+    #[test]
+    fn a_table_without_a_run_lacks_no_journal() {
+        let folder = tempfile::tempdir().unwrap();
+        std::fs::write(folder.path().join(super::POINTS), "point,time_s\n").unwrap();
+        assert!(super::damage_in(folder.path()).unwrap().is_empty());
+        std::fs::write(folder.path().join(super::IDENTITY), "").unwrap();
+        assert_eq!(super::damage_in(folder.path()).unwrap().len(), 1);
+    }
 }
