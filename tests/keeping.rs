@@ -287,7 +287,7 @@ fn one_flipped_bit_is_told_by_replay_report_recover_and_diagnose() {
     assert!(ask(&["report"], &out).1["damage"].to_string().contains("points.csv and passes.jsonl differ"));
 }
 
-/// A table that is cut, empty or gone: everybody is told, and the same command puts every pass back and
+/// A table that is cut, empty or gone: every command says so, and the same command puts every pass back and
 /// drives none.
 #[test]
 fn a_table_that_lost_passes_is_told_and_written_again_from_the_journal() {
@@ -383,14 +383,17 @@ fn no_output_takes_the_place_of_a_file_of_another_kind() {
         assert!(std::fs::read(&record).unwrap() == before, "{words:?}");
     };
     for format in ["csv", "mcap"] {
-        refused(&["export", run, "--to", format, "--out", mine], "did not write it");
+        refused(&["export", run, "--to", format, "--out", mine], "no earlier output of this kind");
         refused(&["export", run, "--to", format, "--out", record.to_str().unwrap()], "session's record");
     }
     refused(&["report", run, "--out", record.to_str().unwrap()], "session's record");
-    refused(&["cases", "noop", "--cases", "3", "--hashes", "0", "-o", mine], "did not write it");
+    refused(
+        &["cases", "noop", "--cases", "3", "--hashes", "0", "-o", mine],
+        "no earlier output of this kind",
+    );
     refused(&["blind", "--sets", "1", "--write", mine], "not an empty folder");
     refused(&["blind", "--sets", "1", "--write", run], "not an empty folder");
-    refused(&["diagnose", run, "--save-plan", mine], "did not write it");
+    refused(&["diagnose", run, "--save-plan", mine], "no earlier output of this kind");
     refused(&["diagnose", run, "--save-model", "x", "--report", "./x"], "place of --save-model");
     refused(&["blind", "--sets", "0"], "0 is not in");
     refused(&["faults", "--seeds", "0"], "0 is not in");

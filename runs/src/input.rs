@@ -289,7 +289,7 @@ fn line_at(text: &str, place: Option<Range<usize>>) -> (usize, &str) {
     (line, text.lines().nth(line).unwrap_or_default().split('#').next().unwrap_or_default().trim())
 }
 
-/// What helps where a key or a table stands twice.
+/// What helps where a key or a table is there twice.
 fn of_repeated(text: &str, place: Option<Range<usize>>) -> String {
     let (_, line) = line_at(text, place);
     let name = line.trim_matches(['[', ']']);
@@ -299,16 +299,17 @@ fn of_repeated(text: &str, place: Option<Range<usize>>) -> String {
     match line.starts_with('[') {
         true if both.iter().all(here) => format!("write [[{name}]] each time"),
         true => format!("put all its keys under one [{name}], or remove one of them"),
-        false => "it stands twice in this table: remove one of them".into(),
+        false => "this table has it twice: remove one of them".into(),
     }
 }
 
 /// How one value, or one table, is written where a list is needed: `["50kPa"]`, `[[series]]`.
 pub fn as_list(text: &str, place: Option<Range<usize>>) -> Option<String> {
     let (_, line) = line_at(text, place);
+    let number = |c: char| c.is_ascii_digit() || "+-.".contains(c);
     match (line.strip_prefix('['), line.split_once('=')) {
         (Some(name), _) => Some(format!("write [[{}]]", name.trim_end_matches(']'))),
-        (None, Some((key, value))) if !value.contains('{') => {
+        (None, Some((key, value))) if value.trim().trim_matches('"').starts_with(number) => {
             Some(format!("write {} = [{}]", key.trim(), value.trim()))
         }
         _ => None,
@@ -410,7 +411,7 @@ mod tests {
             ("[base]\nfrequency_hz = 27,5 # kHz\n", "a number has a decimal point: 27.5"),
             ("[base\nfrequency_hz = 27\n", "`key = value`"),
             ("a = [1, 2\nb = 3\n", "`key = value`"),
-            ("[base]\nw = 1\nw = 2\n", "it stands twice in this table: remove one of them"),
+            ("[base]\nw = 1\nw = 2\n", "this table has it twice: remove one of them"),
             ("[base]\nw = 1\n[base]\n", "put all its keys under one [base], or remove one of them"),
             ("[[cell]]\nw = 1\n[cell] # two\n", "write [[cell]] each time"),
             ("[cell]\nw = 1\n[[cell]]\n", "write [[cell]] each time"),

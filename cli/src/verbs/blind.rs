@@ -84,7 +84,7 @@ pub fn run(args: Args, json: bool) -> miette::Result<ExitCode> {
     Ok(ExitCode::SUCCESS)
 }
 
-/// The folder for the sets is new or holds nothing: what stands there is not replaced.
+/// The folder for the sets is new or holds nothing: what is there is not replaced.
 fn empty(folder: &Path) -> miette::Result<()> {
     if std::fs::read_dir(folder).is_ok_and(|mut found| found.next().is_none()) || !folder.exists() {
         return Ok(());

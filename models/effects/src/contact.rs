@@ -322,3 +322,19 @@ fn angle_by_bisection(load: f64) -> f64 {
 pub fn lost_to_stick(phi: f64, drag: f64) -> f64 {
     stick::lost(phi, phi.sin_cos(), drag)
 }
+
+/// A contact to test: the paper's condition on round springs.
+#[cfg(test)]
+fn example() -> Contact {
+    let design = crate::Design {
+        duration_s: 1.0,
+        reference_load_n: 0.3,
+        reference_speed_m_s: 0.02,
+        reference_frequency_hz: 30_000.0,
+        reference_temperature_c: 20.0,
+        stroke_m: 0.03,
+        largest_amplitude_m: 5e-6,
+    };
+    let base = crate::Baseline { mu0: 0.5, normal_stiffness_n_per_m: 1e6, lateral_stiffness_n_per_m: 4e5 };
+    base.contact(&models::condition::Condition::paper(), &design)
+}

@@ -182,7 +182,7 @@ impl Unit {
         self.beside(value, value)
     }
 
-    /// The same in the unit that suits `other`, which stands beside it: nothing is 0 um beside 0.2 um.
+    /// The same in the unit that suits `other`, which is printed beside it: nothing is 0 um beside 0.2 um.
     fn beside(self, value: f64, other: f64) -> String {
         if value == f64::INFINITY {
             return "no data".into();

@@ -65,7 +65,7 @@ pub fn replaceable(path: &Path, output: &[u8]) -> miette::Result<()> {
     }
     miette::bail!(
         help = "give a name that is free, or remove the file",
-        "{} exists, and muprime did not write it: nothing was replaced",
+        "{} exists and is no earlier output of this kind: nothing was replaced",
         path.display()
     )
 }

@@ -33,7 +33,7 @@ impl<'a> Remarked<'a> {
 }
 
 /// What a reader of the passes must know. Without a pass without vibration the loop has `mu_0` from the
-/// model, and the record keeps it: the model then stands in the measured values.
+/// model, and the record has it: the measured values then contain the model.
 pub fn remarks(passes: &[MeasuredPass]) -> Vec<String> {
     let refers = |p: &MeasuredPass| p.pass.amplitude == PeakToPeak::ZERO && p.pass.lateral_force_n.is_some();
     let measured = passes.iter().any(|p| p.comparison.is_some_and(|c| c.mu_relative.is_some()));

@@ -106,6 +106,14 @@ const STATISTICS: [&str; 15] = [
     "sem",
 ];
 
+/// Words of a row that is a sum, and names of statistics in two words.
+const SUMS: [&str; 6] = ["sum", "summe", "total", "meanvalue", "standarddeviation", "standarddev"];
+
+/// Whether a word, plain, names a row that sums others up.
+pub fn sums_up(word: &str) -> bool {
+    [&MEANS[..], &STATISTICS, &SUMS].iter().any(|words| words.contains(&word))
+}
+
 /// What a header means, also behind the name of a structure or the word for a mean.
 fn found(header: &str, row_of_units: Option<&str>) -> Option<(usize, Option<(String, Unit)>)> {
     let mean = header.split_once([' ', '.', '_']).filter(|(word, _)| MEANS.contains(&plain(word).as_str()));

@@ -1,39 +1,13 @@
 //! Where the headers of a table are: one before the data, and others further down, each of which holds for the rows below it.
 
 use super::grid::{Block, Cell, Grid, Row};
-use super::guess::{heads, name_of};
+use super::guess::{heads, name_of, sums_up};
 use super::map::stated;
 use super::targets::plain;
 use super::units::is_unit;
 
 /// Why a text among the rows is left out.
 pub const ONE_TEXT: &str = "one text, no row of the table";
-
-/// Names of rows that sum others up, plain.
-const SUMMARIES: [&str; 22] = [
-    "mean",
-    "average",
-    "avg",
-    "mittel",
-    "mittelwert",
-    "median",
-    "std",
-    "stdev",
-    "stddev",
-    "stdabw",
-    "sd",
-    "standarddeviation",
-    "standardabweichung",
-    "min",
-    "max",
-    "minimum",
-    "maximum",
-    "sum",
-    "summe",
-    "total",
-    "meanvalue",
-    "standarddev",
-];
 
 /// What cures a table without rows.
 pub const NO_ROWS_HELP: &str = "export the table with its rows of numbers";
@@ -164,6 +138,7 @@ impl Source {
         }
         let named = !grid.header.is_empty();
         self.below(&mut grid, rows.into_iter().skip(first).collect(), &is_data, wide);
+        leave_out_summaries(&mut grid);
         let most = grid.rows.iter().filter(|r| r.block == 0).map(|row| row.cells.len()).max().unwrap_or(0);
         let wide = if named && !self.places { grid.header.len() } else { most.max(1) };
         grid.header.truncate(wide);
@@ -280,7 +255,7 @@ impl Source {
                 format!("below row {}, which states other units: make a file of each part", last.place)
             });
         }
-        // Marks of failed readings stand in rows of words too: they are alike, or in a column of words.
+        // Marks of failed readings make rows of words too: they are alike, or in a column of words.
         let distinct = words.iter().enumerate().all(|(k, w)| !words[..k].contains(w));
         let above = grid.rows.last().map(|r| &r.cells[..]).unwrap_or_default();
         let beside = (above.iter().zip(&last.cells))
@@ -355,10 +330,7 @@ impl Source {
             Some(k) => grid.blocks[k].header.len(),
         };
         let cells = row.width();
-        let sums = |c: &&Cell| matches!(c, Cell::Text(t) if SUMMARIES.contains(&plain(t).as_str()));
-        let why = if let Some(cell) = row.cells.iter().find(sums) {
-            Some(format!("'{}' sums up other rows: no pass", cell.shown()))
-        } else if cells == 1 && names > 1 && self.numbers(&row) == 0 {
+        let why = if cells == 1 && names > 1 && self.numbers(&row) == 0 {
             Some(ONE_TEXT.to_string())
         } else if !self.places && (cells > names || self.blanks && cells < names) {
             Some(format!("{cells} cells in place of {names}"))
@@ -371,6 +343,38 @@ impl Source {
         }
         row.block = block;
         grid.rows.push(row);
+    }
+}
+
+/// Takes out rows that sum others up, by a word of theirs. An operator may be called Max: a word that two rows
+/// have in succession, or that half of the rows have, is a value of its column.
+fn leave_out_summaries(grid: &mut Grid) {
+    let rows = std::mem::take(&mut grid.rows);
+    let mut sums = vec![None; rows.len()];
+    for column in 0..rows.iter().map(|r| r.cells.len()).max().unwrap_or(0) {
+        let word = |row: &Row| match row.cells.get(column) {
+            Some(Cell::Text(t)) if t.starts_with(char::is_alphabetic) => {
+                Some(plain(t)).filter(|w| sums_up(w))
+            }
+            _ => None,
+        };
+        let words: Vec<Option<String>> = rows.iter().map(word).collect();
+        let values: Vec<&String> =
+            words.windows(2).filter(|pair| pair[0] == pair[1]).filter_map(|pair| pair[0].as_ref()).collect();
+        let named = |k: &usize| words[*k].as_ref().is_some_and(|word| !values.contains(&word));
+        let found: Vec<usize> = (0..rows.len()).filter(named).collect();
+        if 2 * found.len() < rows.len() {
+            found.into_iter().for_each(|k| sums[k] = Some(rows[k].cells[column].shown()));
+        }
+    }
+    for (row, sum) in rows.into_iter().zip(sums) {
+        match sum {
+            None => grid.rows.push(row),
+            Some(word) => {
+                let why = format!("'{word}' sums up other rows: no pass");
+                grid.left_out.push((row.place, texts(&row).join(" "), why));
+            }
+        }
     }
 }
 

@@ -300,7 +300,7 @@ fn refuse_thousands(rows: &[Row], mark: char) -> miette::Result<()> {
                 help = format!(
                     "say that it is a decimal mark (--decimal {mark}), or export the table without thousands separators"
                 ),
-                "line {}: '{}' stands in one column with whole numbers up to {largest}: decimals, or a separator of thousands",
+                "line {}: '{}' is in one column with whole numbers up to {largest}: decimals, or a separator of thousands",
                 first.0,
                 first.1
             );

@@ -2,7 +2,6 @@
 
 use super::{Args, Watching, job_of, measure, new_name};
 use miette::IntoDiagnostic;
-
 use runs::campaign::{self, Campaign};
 use runs::catalogue::runs_folder;
 use runs::print::answer_json;

@@ -78,19 +78,7 @@ mod tests {
     use crate::contact::mean_friction as mean;
 
     fn contact(amplitude_pp: f64, speed: f64) -> Contact {
-        let design = crate::Design {
-            duration_s: 1.0,
-            reference_load_n: 0.3,
-            reference_speed_m_s: 0.02,
-            reference_frequency_hz: 30_000.0,
-            reference_temperature_c: 20.0,
-            stroke_m: 0.03,
-            largest_amplitude_m: 5e-6,
-        };
-        let base =
-            crate::Baseline { mu0: 0.5, normal_stiffness_n_per_m: 1e6, lateral_stiffness_n_per_m: 4e5 };
-        let c = base.contact(&models::condition::Condition::paper(), &design);
-        Contact { amplitude_pp, speed, ..c }
+        Contact { amplitude_pp, speed, ..crate::contact::example() }
     }
 
     fn with(ratio: f64, phase: f64, c: &Contact) -> f64 {

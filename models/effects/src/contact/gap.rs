@@ -63,18 +63,7 @@ mod tests {
     /// sum.
     #[test]
     fn what_is_carried_balances_load_and_attraction() {
-        let design = crate::Design {
-            duration_s: 1.0,
-            reference_load_n: 0.3,
-            reference_speed_m_s: 0.02,
-            reference_frequency_hz: 30_000.0,
-            reference_temperature_c: 20.0,
-            stroke_m: 0.03,
-            largest_amplitude_m: 5e-6,
-        };
-        let base =
-            crate::Baseline { mu0: 0.5, normal_stiffness_n_per_m: 1e6, lateral_stiffness_n_per_m: 4e5 };
-        let c = base.contact(&models::condition::Condition::paper(), &design);
+        let c = crate::contact::example();
         for (amplitude_pp, reach) in [(3e-6, 3e-7), (6e-6, 1e-6), (2e-6, 1e-8)] {
             let c = Contact { amplitude_pp, ..c };
             let load = carried(&c, 0.2, reach);

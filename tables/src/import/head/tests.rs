@@ -19,6 +19,20 @@ fn rows_that_sum_others_up_are_no_passes() {
     assert_eq!(told.len(), 3);
 }
 
+/// A tester called Max lost his passes.
+#[test]
+fn a_name_that_is_a_statistic_too_is_a_name() {
+    for row in ["Max;{v};0.25;{fx}", "{k}x;{v};0.25;{fx}"] {
+        let text = table("Operator;v (mm/s);Fz (N);Fx (N)", row)
+            .replace("\n3x;", "\nMax;")
+            .replace("\n4x;", "\nMax;");
+        let log = imported(&text, "", "amplitude_pp=0,time_s=rows", false).unwrap().log;
+        assert_eq!(log.passes, 24, "{row}");
+        let log = imported(&format!("{text}Mean;20;0.25;0.1\n"), "", "amplitude_pp=0,time_s=rows", false);
+        assert_eq!(log.unwrap().log.passes, 24, "{row}");
+    }
+}
+
 #[test]
 fn other_units_end_a_table() {
     let below = "s;m/s;mN;mN\n60;0.02;250;100\n62;-0.02;250;-100\n";
