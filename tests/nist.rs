@@ -116,13 +116,8 @@ fn check_nonlinear(name: &str, text: &str, model: impl Fn(f64, &[f64], &mut [f64
     let (starts, certified, residual_sd, data) = nonlinear_set(text);
     let y: Vec<f64> = data.iter().map(|row| row[0]).collect();
     for (number, start) in starts.iter().enumerate() {
-        let fit = nonlinear::fit(
-            &|i, b, gradient| model(data[i][1], b, gradient),
-            &y,
-            nonlinear::Scatter::Unknown,
-            start,
-        )
-        .unwrap_or_else(|e| panic!("{name}, start {}: {e}", number + 1));
+        let fit = nonlinear::fit(&|i, b, gradient| model(data[i][1], b, gradient), &y, start)
+            .unwrap_or_else(|e| panic!("{name}, start {}: {e}", number + 1));
         let got = worst(&fit, &certified, residual_sd, 11.0);
         println!(
             "{name:>9}, start {}: LRE estimates {:.1}, sds {:.1}, residual sd {:.1}",

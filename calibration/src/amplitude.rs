@@ -85,14 +85,7 @@ fn relative_scatter(points: &[AmplitudePoint]) -> Vec<f64> {
 fn lack_of_fit(points: &[AmplitudePoint], weighted: &[f64], parameters: usize) -> Option<f64> {
     let mut order: Vec<usize> = (0..points.len()).collect();
     order.sort_by(|a, b| points[*a].at.total_cmp(&points[*b].at));
-    let (mut between, mut within, mut groups) = (0.0, 0.0, 0usize);
-    for group in order.chunk_by(|a, b| points[*a].at == points[*b].at) {
-        let mean = group.iter().map(|i| weighted[*i]).sum::<f64>() / group.len() as f64;
-        between += group.len() as f64 * mean * mean;
-        within += group.iter().map(|i| (weighted[*i] - mean).powi(2)).sum::<f64>();
-        groups += 1;
-    }
-    let (b, w) = (groups as f64 - parameters as f64, (points.len() - groups) as f64);
-    (b >= 1.0 && w >= 3.0)
-        .then(|| crate::uncertainty::student::f_test_p_value(between / b / (within / w), b, w))
+    let groups = order.chunk_by(|a, b| points[*a].at == points[*b].at);
+    let groups: Vec<Vec<f64>> = groups.map(|group| group.iter().map(|i| weighted[*i]).collect()).collect();
+    crate::uncertainty::student::lack_of_fit(&groups, parameters)
 }

@@ -67,11 +67,6 @@ pub struct Parameter {
 }
 
 impl Parameter {
-    /// The same with an interval of its own, as the profile of a likelihood gives it: it need not be symmetric.
-    pub fn with_interval(self, ci95: [f64; 2]) -> Self {
-        Parameter { ci95, ..self }
-    }
-
     /// The same with value and interval limited to the quantity's possible values, `least` or more. The part
     /// that is cut off holds no possible value, so the coverage stays the same; a lower end at `least` means
     /// that the data give an upper bound only. The value is then the likelihood's maximum within the range.
@@ -206,18 +201,6 @@ pub struct Occasion {
     pub valid_days: f64,
 }
 
-impl Occasion {
-    /// Validity from this occasion on.
-    pub fn validity(&self, temperature_c: Option<[f64; 2]>, range: BTreeMap<String, [f64; 2]>) -> Validity {
-        Validity {
-            from: date::format(self.unix_s),
-            until: date::format(self.unix_s + (self.valid_days * 86_400.0) as i64),
-            temperature_c,
-            range,
-        }
-    }
-}
-
 /// What a calibration found, in the terms that every certificate shares.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Outcome {
@@ -259,7 +242,12 @@ impl Outcome {
             instrument: occasion.instrument.clone(),
             raw_data: occasion.raw_data.clone(),
             residuals: self.residuals,
-            validity: occasion.validity(self.temperature_c, self.range),
+            validity: Validity {
+                from: date::format(occasion.unix_s),
+                until: date::format(occasion.unix_s + (occasion.valid_days * 86_400.0) as i64),
+                temperature_c: self.temperature_c,
+                range: self.range,
+            },
             parameters: self.parameters,
             budget: self.budget,
         }
@@ -294,9 +282,7 @@ impl Certificate {
 
     /// The text of the certificate file, with its content hash.
     pub fn to_toml(&self) -> String {
-        let mut sealed = self.clone();
-        sealed.content_sha256 = self.content_hash();
-        sealed.canonical()
+        self.clone().seal().canonical()
     }
 
     /// Writes the hash of the content into the certificate.

@@ -7,7 +7,7 @@ pub mod friction;
 pub mod springs;
 pub mod stiffness;
 
-use crate::certificate::{BudgetLine, CertificateKind, Finding, Outcome, Residuals, parameters};
+use crate::certificate::{BudgetLine, CertificateKind, Finding, Outcome, Parameter, Residuals, parameters};
 use crate::identify::Identified;
 use crate::identify::skin::{IdentifiedSkin, Profile};
 use crate::regression::FitError;
@@ -54,6 +54,11 @@ pub enum FingerError {
     Fit(#[from] FitError),
 }
 
+/// Refuses what is not enough of something.
+fn enough(what: &'static str, found: usize, needed: usize) -> Result<(), FingerError> {
+    if found < needed { Err(FingerError::TooFew { what, found, needed }) } else { Ok(()) }
+}
+
 /// What was measured of a fingertip; each part may be missing.
 #[derive(Clone, Debug, PartialEq, Default)]
 pub struct FingerFit {
@@ -90,7 +95,7 @@ impl FingerFit {
             .map(|(parameter, ends)| match ends {
                 Ends::Free => parameter,
                 Ends::AtLeast(least) => parameter.at_least(*least),
-                Ends::Both(ci95) => parameter.with_interval(*ci95),
+                Ends::Both(ci95) => Parameter { ci95: *ci95, ..parameter },
             })
             .collect();
         for (p, ends) in parameters.iter().zip(&ends) {
@@ -198,13 +203,51 @@ impl Parts {
         self.residuals(s.passes, s.residual_rms_n, s.residual_largest_n, "N");
     }
 
-    fn modulus(&mut self, m: &Identified, skin: Option<&IdentifiedSkin>) {
-        let fit = ModulusFit::of(m, skin);
-        for (name, unit, value, ci95) in fit.parameters {
-            self.profiled(name, unit, value, ci95, m.points as f64 - 1.0);
+    /// Elastic skin where that will do, as the paper has it; otherwise the skin with all three free. Penalty
+    /// and time are parameters only where both ends of their interval were found.
+    fn modulus(&mut self, elastic: &Identified, skin: Option<&IdentifiedSkin>) {
+        let dof = elastic.points as f64 - 1.0;
+        let (value, ci95) = match skin {
+            Some(skin) if !skin.elastic_will_do() => (skin.young_modulus_pa.best, skin.young_modulus_pa.ci95),
+            _ => (elastic.young_modulus_pa, elastic.ci95_pa),
+        };
+        self.profiled("stratum_corneum.young_modulus", "Pa", value, ci95, dof);
+        self.residuals(elastic.points, elastic.residual_deg[0], elastic.residual_deg[1], "deg");
+        self.remarks.push(format!(
+            "modulus of elastic skin: {:.3e} Pa, 95 % profile interval {:.3e} to {:.3e} Pa, residual {:.1} deg rms",
+            elastic.young_modulus_pa, elastic.ci95_pa[0], elastic.ci95_pa[1], elastic.residual_deg[0]
+        ));
+        let mut cannot = elastic.cannot_tell.clone();
+        if let Some(skin) = skin {
+            let gain = skin.chi2_elastic - skin.chi2;
+            let verdict =
+                if skin.elastic_will_do() { "elastic skin will do" } else { "elastic skin does not fit" };
+            self.remarks.push(format!(
+                "{verdict}: freeing penalty and retardation time lowers chi-square by {gain:.1} to {:.1}",
+                skin.chi2
+            ));
+            let quantities: [(&str, &str, &'static str, &Profile); 3] = [
+                ("modulus", " Pa", "", &skin.young_modulus_pa),
+                ("penalty over modulus", "", "stratum_corneum.penalty_ratio", &skin.penalty_ratio),
+                ("retardation time", " s", "stratum_corneum.retardation_time", &skin.retardation_time_s),
+            ];
+            for (quantity, unit, parameter, profile) in quantities {
+                let [low, high] = [0, 1].map(|i| end(profile.ci95[i], profile.closed[i]));
+                self.remarks.push(format!(
+                    "all three free: {quantity} {:.3e}{unit}, 95 % profile interval {low} to {high}{unit}{}",
+                    profile.best,
+                    if profile.gaps { ", with gaps" } else { "" }
+                ));
+                if !parameter.is_empty() && profile.closed == [true; 2] && !profile.gaps {
+                    let unit = if unit.is_empty() { "1" } else { "s" };
+                    self.profiled(parameter, unit, profile.best, profile.ci95, dof);
+                }
+            }
+            cannot.extend(skin.cannot_tell.iter().cloned());
         }
-        self.residuals(m.points, m.residual_deg[0], m.residual_deg[1], "deg");
-        self.remarks.extend(fit.remarks);
+        self.remarks.extend(cannot.iter().map(|what| format!("the phases cannot tell {what}")));
+        let else_wrong = "a wrong mean pressure or damping of the model: it would shift the modulus";
+        self.remarks.push(format!("the phases cannot tell {else_wrong} without a trace in the misfit"));
     }
 }
 
@@ -227,59 +270,4 @@ fn end(value: f64, closed: bool) -> String {
 /// A profile interval is not symmetric; the certificate's standard uncertainty is that of its half-width.
 fn half_width_sd(ci95: [f64; 2]) -> f64 {
     0.5 * (ci95[1] - ci95[0]) / 1.96
-}
-
-/// What the certificate says of the inverse analysis.
-struct ModulusFit {
-    /// Name, unit, value, 95 % interval.
-    parameters: Vec<(&'static str, &'static str, f64, [f64; 2])>,
-    remarks: Vec<String>,
-}
-
-impl ModulusFit {
-    /// Elastic skin where that will do, as the paper has it; otherwise the skin with all three free. Penalty
-    /// and time are parameters only where both ends of their interval were found.
-    fn of(elastic: &Identified, skin: Option<&IdentifiedSkin>) -> ModulusFit {
-        let (value, ci95) = match skin {
-            Some(skin) if !skin.elastic_will_do() => (skin.young_modulus_pa.best, skin.young_modulus_pa.ci95),
-            _ => (elastic.young_modulus_pa, elastic.ci95_pa),
-        };
-        let mut parameters = vec![("stratum_corneum.young_modulus", "Pa", value, ci95)];
-        let mut remarks = vec![format!(
-            "modulus of elastic skin: {:.3e} Pa, 95 % profile interval {:.3e} to {:.3e} Pa, residual {:.1} deg rms",
-            elastic.young_modulus_pa, elastic.ci95_pa[0], elastic.ci95_pa[1], elastic.residual_deg[0]
-        )];
-        let mut cannot = elastic.cannot_tell.clone();
-        if let Some(skin) = skin {
-            let gain = skin.chi2_elastic - skin.chi2;
-            let verdict =
-                if skin.elastic_will_do() { "elastic skin will do" } else { "elastic skin does not fit" };
-            remarks.push(format!(
-                "{verdict}: freeing penalty and retardation time lowers chi-square by {gain:.1} to {:.1}",
-                skin.chi2
-            ));
-            let quantities: [(&str, &str, &'static str, &Profile); 3] = [
-                ("modulus", " Pa", "", &skin.young_modulus_pa),
-                ("penalty over modulus", "", "stratum_corneum.penalty_ratio", &skin.penalty_ratio),
-                ("retardation time", " s", "stratum_corneum.retardation_time", &skin.retardation_time_s),
-            ];
-            for (quantity, unit, parameter, profile) in quantities {
-                let [low, high] = [0, 1].map(|i| end(profile.ci95[i], profile.closed[i]));
-                remarks.push(format!(
-                    "all three free: {quantity} {:.3e}{unit}, 95 % profile interval {low} to {high}{unit}{}",
-                    profile.best,
-                    if profile.gaps { ", with gaps" } else { "" }
-                ));
-                if !parameter.is_empty() && profile.closed == [true; 2] && !profile.gaps {
-                    let unit = if unit.is_empty() { "1" } else { "s" };
-                    parameters.push((parameter, unit, profile.best, profile.ci95));
-                }
-            }
-            cannot.extend(skin.cannot_tell.iter().cloned());
-        }
-        remarks.extend(cannot.iter().map(|what| format!("the phases cannot tell {what}")));
-        let else_wrong = "a wrong mean pressure or damping of the model: it would shift the modulus";
-        remarks.push(format!("the phases cannot tell {else_wrong} without a trace in the misfit"));
-        ModulusFit { parameters, remarks }
-    }
 }

@@ -9,6 +9,7 @@
 pub mod skin;
 
 use crate::phase::table::PhasePoint;
+use crate::regression::ends;
 use models::quantity::PeakToPeak;
 use serde::Serialize;
 
@@ -137,13 +138,8 @@ pub fn identify(
             (best, least) = best_of(common_sd).ok_or(IdentifyError::NoModel)?;
         }
     }
-    let inside: Vec<f64> = (0..=GRID)
-        .map(|k| modulus(k as f64))
-        .chain([best])
-        .filter(|e| chi2(*e, common_sd) <= least + CHI2_95)
-        .collect();
-    let low = inside.iter().fold(f64::INFINITY, |a, b| a.min(*b));
-    let high = inside.iter().fold(0.0, |a: f64, b| a.max(*b));
+    let moduli = (0..=GRID).map(|k| modulus(k as f64)).chain([best]);
+    let [low, high] = ends(moduli.filter(|e| chi2(*e, common_sd) <= least + CHI2_95));
     let closed = [low > search.lowest_pa * 1.000_001, high < search.highest_pa * 0.999_999];
     let sds: Vec<f64> = given.iter().map(|sd| sd.unwrap_or(common_sd)).collect();
     let residuals: Vec<f64> =

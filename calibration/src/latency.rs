@@ -58,7 +58,7 @@ pub fn channel_delay(
     if delays_s.len() < NEEDED {
         return Err(LatencyError::TooFew { channel: channel.into(), found: delays_s.len(), needed: NEEDED });
     }
-    let mut delay = Input::type_a(channel, delays_s);
+    let mut delay = Input::type_a(delays_s);
     let statistical = delay.standard_uncertainty;
     delay.standard_uncertainty = statistical.hypot(resolution_s / 12f64.sqrt());
     delay.degrees_of_freedom *= (delay.standard_uncertainty / statistical).powi(4);
@@ -74,7 +74,7 @@ pub fn channel_delay(
         delay,
         jitter_s,
         jitter_ci95_s: [bound(0.975), bound(0.025)],
-        range_s: delays_s.iter().fold([f64::INFINITY, f64::NEG_INFINITY], |[a, b], d| [a.min(*d), b.max(*d)]),
+        range_s: crate::regression::ends(delays_s.iter().copied()),
         edges: delays_s.len(),
     })
 }

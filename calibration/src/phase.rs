@@ -47,7 +47,7 @@ pub fn repeated(shifts: &[Shift], frequency_hz: f64, delay_sd_s: f64) -> Result<
     let mean = s.atan2(c).to_degrees();
     let unwrapped: Vec<f64> =
         shifts.iter().map(|x| mean + (x.phase_deg - mean + 180.0).rem_euclid(360.0) - 180.0).collect();
-    let mut phase_deg = Input::type_a("phase shift", &unwrapped);
+    let mut phase_deg = Input::type_a(&unwrapped);
     let statistical = phase_deg.standard_uncertainty;
     let common = 360.0 * frequency_hz * delay_sd_s;
     phase_deg.standard_uncertainty = statistical.hypot(common);

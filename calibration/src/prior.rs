@@ -16,10 +16,7 @@ pub fn take(known: &mut Calibration, verified: Verified) -> Result<(), Refusal> 
     match certificate.kind {
         CertificateKind::Force => {
             let force = ForceCalibration::compile(verified, None)?;
-            let priors = force.priors();
-            known.lateral_gain_sd = Some(priors.lateral_gain_sd);
-            known.normal_gain_sd = Some(priors.normal_gain_sd);
-            [known.crosstalk_sd, known.crosstalk_onto_normal_sd] = priors.cross_talk_sd.map(Some);
+            force.take_into(known);
             let pull = certificate.budget.iter().find(|line| line.source == "direction of the normal pull");
             known.tilt_sd_rad = pull.map(|line| line.standard_uncertainty);
             if let Some(zero) = Zero::of_certificate(certificate) {

@@ -36,16 +36,16 @@ impl Fit {
         self.covariance[(parameter, parameter)].sqrt()
     }
 
-    /// Correlation coefficient of two parameters.
-    pub fn correlation(&self, a: usize, b: usize) -> f64 {
-        self.covariance[(a, b)] / (self.standard_uncertainty(a) * self.standard_uncertainty(b))
-    }
-
     /// Standard uncertainty of `gradient . estimates`, for example of a prediction (GUM H.3.4).
     pub fn standard_uncertainty_along(&self, gradient: &[f64]) -> f64 {
         let g = DVector::from_column_slice(gradient);
         (g.transpose() * &self.covariance * &g)[(0, 0)].max(0.0).sqrt()
     }
+}
+
+/// The least and the greatest of some values.
+pub(crate) fn ends(values: impl Iterator<Item = f64>) -> [f64; 2] {
+    values.fold([f64::INFINITY, f64::NEG_INFINITY], |[low, high], x| [low.min(x), high.max(x)])
 }
 
 /// Why a fit gave no answer.

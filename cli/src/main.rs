@@ -101,7 +101,7 @@ enum Verb {
 
 /// The command line, with an example for every command.
 fn command() -> clap::Command {
-    cli::groups::grouped(cli::examples::with_examples(cli::quantities::with_units(Cli::command())))
+    cli::groups::grouped(cli::examples::with_examples(cli::quantities::with_units(Cli::command()), ""))
 }
 
 fn parsed(arguments: impl IntoIterator<Item = std::ffi::OsString>) -> Result<Cli, clap::Error> {

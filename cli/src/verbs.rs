@@ -39,7 +39,7 @@ pub mod watch;
 
 /// What nearly every verb needs.
 mod prelude {
-    pub use super::{DONE, FAILED, REFUSED, exit};
+    pub use super::{DONE, FAILED, REFUSED, answered, exit};
     pub use ::runs::print::answer_json;
     pub use ::runs::{out, say};
     pub use miette::{IntoDiagnostic, WrapErr};
@@ -49,6 +49,7 @@ mod prelude {
 }
 
 use miette::IntoDiagnostic;
+use std::fmt::Display;
 use std::path::{Path, PathBuf};
 use std::process::ExitCode;
 use std::sync::OnceLock;
@@ -78,10 +79,7 @@ const UNREAD: &str = "unread.txt";
 static RUN: OnceLock<PathBuf> = OnceLock::new();
 
 /// A rig is driven from now on: nobody waits for a reader of standard output or standard error, and what they
-/// do not take is written into the run's folder afterwards.
-///
-/// # Errors
-/// The system gives no thread.
+/// do not take is written into the run's folder afterwards. Fails where the system gives no thread.
 pub fn tell_beside(run: &Path) -> miette::Result<()> {
     let _ = RUN.set(run.into());
     ::runs::print::beside().into_diagnostic()
@@ -95,26 +93,17 @@ pub fn keep_unread() {
     }
 }
 
-/// The setup of that name or path.
-///
-/// # Errors
-/// It cannot be used: all that is wrong with it, with places and remedies.
+/// The setup of that name or path; a refusal says all that is wrong with it, with places and remedies.
 pub fn setup(name: &str) -> miette::Result<::runs::setup::Setup> {
     ::runs::setup::Setup::load(name).map_err(|why| tables::check::refusal(why, name, "setup"))
 }
 
-/// The plan of that name or path.
-///
-/// # Errors
-/// As [`setup`].
+/// The plan of that name or path; refused as [`setup`].
 pub fn plan(name: &str) -> miette::Result<::runs::plan::Plan> {
     ::runs::plan::Plan::load(name).map_err(|why| tables::check::refusal(why, name, "plan"))
 }
 
-/// The defects of a file.
-///
-/// # Errors
-/// As [`setup`].
+/// The defects of a file; refused as [`setup`].
 pub fn defects(path: &Path) -> miette::Result<sim::defects::Defects> {
     let text = ::runs::input::text_of(path)?;
     sim::defects::Defects::parse(&text).map_err(|why| {
@@ -122,10 +111,7 @@ pub fn defects(path: &Path) -> miette::Result<sim::defects::Defects> {
     })
 }
 
-/// What a person named is there.
-///
-/// # Errors
-/// It is not: says what is beside it.
+/// Refuses what a person named and that is not there, and says what is beside it.
 pub fn there(path: &Path, what: &str) -> miette::Result<()> {
     const RUN: [&str; 5] = ["points.csv", ::runs::run_dir::JOURNAL, "run.toml", "run-1.mcap", "sessions"];
     if path.is_dir() && what.starts_with("run") && !RUN.iter().any(|name| path.join(name).exists())
@@ -182,6 +168,19 @@ pub fn plain(error: &str) -> String {
         });
     }
     text + rest
+}
+
+/// The answer of a verb that is done: the document with `--json`, else words for a person.
+pub fn answered(
+    json: bool,
+    document: &impl serde::Serialize,
+    words: impl Display,
+) -> miette::Result<ExitCode> {
+    match json {
+        true => ::runs::print::answer_json(document),
+        false => ::runs::out!("{words}"),
+    }
+    exit(DONE)
 }
 
 /// A status as the process's exit code.

@@ -30,7 +30,6 @@ pub struct Kernels {
     coordinates: Coordinates,
     /// With the weather that goes with time too: sizes do not go over time.
     weather: Coordinates,
-    largest_amplitude: f64,
     smooth: (Lengths, Kernel),
     /// By effect; without those whose covariates do not change in the table.
     bends: Vec<Bend>,
@@ -48,12 +47,6 @@ struct Bend {
     kernel: Kernel,
 }
 
-impl Bend {
-    fn place(&self, coordinates: &Coordinates, p: &Condition, largest_amplitude: f64) -> [f64; COUNT] {
-        coordinates.place(&at_start(p, self.by_run), largest_amplitude, &self.lengths)
-    }
-}
-
 /// The condition at the start of its run.
 fn at_start(p: &Condition, by_run: bool) -> Condition {
     let since = if by_run { p.time_in_run_s() } else { 0.0 };
@@ -64,10 +57,9 @@ impl Kernels {
     /// The kernels on a table's passes, for these effects.
     pub fn on(problem: &Problem, table: &Table, effects: &[usize]) -> Self {
         let k = &problem.constants;
-        let largest = problem.design.largest_amplitude_m;
         let (coordinates, weather) = (Coordinates::of(table), Coordinates::with_weather(table));
         let over = |coordinates: &Coordinates, lengths: &Lengths, by_run: bool| {
-            let place = |p: &Condition| coordinates.place(&at_start(p, by_run), largest, lengths);
+            let place = |p: &Condition| coordinates.place(&at_start(p, by_run), lengths);
             let places: Vec<_> = problem.passes.iter().map(place).collect();
             Kernel::new(&places, k.form_rank, k.kernel_rest)
         };
@@ -89,7 +81,7 @@ impl Kernels {
             let lengths = size_lengths(k, place);
             Some((lengths, over(&weather, &lengths, false))).filter(|(_, kernel)| kernel.rank() > 1)
         });
-        Kernels { largest_amplitude: largest, smooth, bends, sizes, coordinates, weather }
+        Kernels { smooth, bends, sizes, coordinates, weather }
     }
 
     /// Temperature and humidity, where sizes go over them.
@@ -109,18 +101,16 @@ impl Kernels {
 
     fn of(&self, passes: &[Condition], needed: impl Fn(usize) -> bool) -> Basis {
         let basis = |coordinates: &Coordinates, (lengths, kernel): &(Lengths, Kernel)| {
-            let place = |p: &Condition| coordinates.place(p, self.largest_amplitude, lengths);
+            let place = |p: &Condition| coordinates.place(p, lengths);
             kernel.matrix(&passes.iter().map(place).collect::<Vec<_>>())
         };
         let mut bends: Vec<(usize, DMatrix<f64>)> = Vec::new();
         for bend in self.bends.iter().filter(|bend| needed(bend.effect)) {
-            let place = |p: &Condition| bend.place(&self.coordinates, p, self.largest_amplitude);
+            let place = |p: &Condition| self.coordinates.place(&at_start(p, bend.by_run), &bend.lengths);
             let columns = bend.kernel.matrix(&passes.iter().map(place).collect::<Vec<_>>());
             match bends.last_mut() {
                 // The functions add.
-                Some((effect, all)) if *effect == bend.effect => {
-                    *all = beside_each_other(std::mem::take(all), &columns);
-                }
+                Some((effect, all)) if *effect == bend.effect => *all = beside_each_other(all, &columns),
                 _ => bends.push((bend.effect, columns)),
             }
         }
@@ -132,10 +122,10 @@ impl Kernels {
     }
 }
 
-/// The columns of one function and of another: the functions add.
-fn beside_each_other(first: DMatrix<f64>, other: &DMatrix<f64>) -> DMatrix<f64> {
+/// The columns of one matrix, and after them those of another.
+pub(crate) fn beside_each_other(first: &DMatrix<f64>, other: &DMatrix<f64>) -> DMatrix<f64> {
     let (before, more) = (first.ncols(), other.ncols());
-    let mut all = first.resize_horizontally(before + more, 0.0);
+    let mut all = first.clone().resize_horizontally(before + more, 0.0);
     all.columns_mut(before, more).copy_from(other);
     all
 }
@@ -193,11 +183,8 @@ impl Basis {
     pub fn select(&self, rows: &[usize]) -> Self {
         let of = |m: &DMatrix<f64>| m.select_rows(rows.iter());
         let bends = self.bends.iter().map(|(e, m)| (*e, of(m))).collect();
-        Basis {
-            smooth: of(&self.smooth),
-            bends,
-            sizes: self.sizes.each_ref().map(|sizes| sizes.as_ref().map(of)),
-        }
+        let sizes = self.sizes.each_ref().map(|sizes| sizes.as_ref().map(of));
+        Basis { smooth: of(&self.smooth), bends, sizes }
     }
 
     pub(crate) fn of(&self, effect: usize, bends: Bends) -> Option<&DMatrix<f64>> {

@@ -117,13 +117,7 @@ impl Table {
         }
         let one_sign = |list: &[f64]| {
             let up = list.iter().filter(|r| **r > 0.0).count() as f64 / list.len() as f64;
-            if up >= ONE_SIGN {
-                1
-            } else if up <= 1.0 - ONE_SIGN {
-                -1
-            } else {
-                0
-            }
+            i8::from(up >= ONE_SIGN) - i8::from(up <= 1.0 - ONE_SIGN)
         };
         let mean = |list: &[f64]| list.iter().sum::<f64>() / list.len() as f64;
         let ratio = mean(&forward) / mean(&backward);
@@ -242,15 +236,13 @@ impl Table {
         let spread = |f: &dyn Fn(&Condition) -> f64| -> f64 {
             // What acts with the plate still as well is judged on all passes.
             let moves = |q: &&Condition| !needs.contains(&Need::Vibration) || q.amplitude > PeakToPeak::ZERO;
-            let (low, high) =
-                p.iter().filter(moves).fold((f64::INFINITY, 0.0f64), |(a, b), q| (a.min(f(q)), b.max(f(q))));
-            if low > 0.0 { high / low } else { f64::INFINITY }
+            let [low, high] = range(p.iter().filter(moves).map(f));
+            if low > 0.0 { high.max(0.0) / low } else { f64::INFINITY }
         };
         // Known at every pass, and over more than this range.
         let changes = |f: &dyn Fn(&Condition) -> Option<f64>, same: f64| {
             let known: Vec<f64> = p.iter().filter_map(f).collect();
-            let (low, high) =
-                known.iter().fold((f64::INFINITY, f64::NEG_INFINITY), |(a, b), v| (a.min(*v), b.max(*v)));
+            let [low, high] = range(known.iter().copied());
             known.len() == p.len() && high - low > same
         };
         needs.iter().find_map(|need| {
@@ -276,13 +268,10 @@ impl Table {
 
     /// Where time starts and what the scales are, for tables of conditions that belong to this one.
     pub fn origin(&self, passes: &[Pass]) -> Origin {
-        let start = passes
-            .iter()
-            .filter(|p| p.lateral_force_n.is_some())
-            .map(|p| p.time_s)
-            .fold(f64::INFINITY, f64::min);
+        let measured = || passes.iter().filter(|p| p.lateral_force_n.is_some());
+        let start = measured().map(|p| p.time_s).fold(f64::INFINITY, f64::min);
         let mut runs: Vec<(Option<String>, f64)> = Vec::new();
-        for p in passes.iter().filter(|p| p.lateral_force_n.is_some()) {
+        for p in measured() {
             match runs.iter_mut().find(|(n, _)| *n == p.run) {
                 Some((_, t)) => *t = t.min(p.time_s),
                 None => runs.push((p.run.clone(), p.time_s)),
@@ -336,22 +325,26 @@ pub fn check(p: &Pass) -> Result<(), DataError> {
     Ok(())
 }
 
+/// Smallest and largest of some values; infinite the other way round of none.
+pub(crate) fn range(values: impl Iterator<Item = f64>) -> [f64; 2] {
+    values.fold([f64::INFINITY, f64::NEG_INFINITY], |[low, high], v| [low.min(v), high.max(v)])
+}
+
 fn scales(passes: &[Condition]) -> Design {
     let mean = |f: &dyn Fn(&Condition) -> f64| {
         (passes.iter().map(|p| f(p).ln()).sum::<f64>() / passes.len().max(1) as f64).exp()
     };
-    let range = |f: &dyn Fn(&Condition) -> f64| {
-        let (low, high) =
-            passes.iter().fold((f64::INFINITY, f64::NEG_INFINITY), |(a, b), p| (a.min(f(p)), b.max(f(p))));
+    let width = |f: &dyn Fn(&Condition) -> f64| {
+        let [low, high] = range(passes.iter().map(f));
         (high - low).max(0.0)
     };
     Design {
-        duration_s: range(&|p| p.time_s),
+        duration_s: width(&|p| p.time_s),
         reference_load_n: mean(&|p| p.normal_force_n),
         reference_speed_m_s: mean(&|p| p.speed_m_s),
         reference_frequency_hz: mean(&|p| p.frequency_hz),
         reference_temperature_c: passes.iter().find_map(|p| p.temperature_c).unwrap_or(20.0),
-        stroke_m: range(&|p| p.position_m),
+        stroke_m: width(&|p| p.position_m),
         largest_amplitude_m: passes.iter().map(|p| p.amplitude.metres()).fold(0.0, f64::max),
     }
 }

@@ -121,9 +121,10 @@ impl Change {
     /// Whether something is bent over this covariate.
     pub fn bends_over(&self, covariate: &Covariate) -> bool {
         self.bent.iter().any(|b| match b.bends {
-            Bends::Input => effects::at(b.effect)
-                .acts
-                .is_some_and(|acts| acts.over.iter().any(|c| c.name == covariate.name)),
+            Bends::Input => {
+                let acts = effects::at(b.effect).acts;
+                acts.is_some_and(|acts| acts.over.iter().any(|c| c.name == covariate.name))
+            }
             Bends::Size => match covariate.role {
                 Role::Place => goes_with_place(b.effect),
                 role => role == Role::Climate,
@@ -157,10 +158,9 @@ fn slope(
     prediction: &DVector<f64>,
     (member, bends): (usize, Bends),
 ) -> Option<DVector<f64>> {
+    let acts = effects::at(members[member].effect).acts;
     Some(match bends {
-        Bends::Input => {
-            problem.sensitivity(members, u, prediction, effects::at(members[member].effect).acts?.on)
-        }
+        Bends::Input => problem.sensitivity(members, u, prediction, acts?.on),
         Bends::Size => problem.size_sensitivity(members, u, prediction, member),
     })
 }
@@ -176,13 +176,16 @@ fn norm(problem: &Problem, force: &DVector<f64>) -> f64 {
     force.iter().zip(&problem.variance).map(|(x, v)| x * x / v).sum::<f64>().sqrt()
 }
 
+/// The transpose of a matrix whose rows are divided by these variances.
+pub(crate) fn weighted(matrix: &DMatrix<f64>, variance: &[f64]) -> DMatrix<f64> {
+    let mut weighted = matrix.transpose();
+    weighted.column_iter_mut().zip(variance).for_each(|(mut column, v)| column.scale_mut(1.0 / v));
+    weighted
+}
+
 /// What recalibration cannot imitate of a force, to first order.
 fn beside_recalibration(problem: &Problem, jacobian: &DMatrix<f64>, force: &DVector<f64>) -> DVector<f64> {
-    let mut weighted = jacobian.clone();
-    for (i, v) in problem.variance.iter().enumerate() {
-        weighted.row_mut(i).scale_mut(1.0 / v);
-    }
-    let t = weighted.transpose();
+    let t = weighted(jacobian, &problem.variance);
     let hessian = &t * jacobian + DMatrix::identity(NUISANCES, NUISANCES);
     hessian.cholesky().map_or_else(|| force.clone(), |c| force - jacobian * c.solve(&(t * force)))
 }

@@ -1,5 +1,5 @@
-//! What an unknown departure looks like: a jump, a bump or a period, with its place, size and odds; and which
-//! causes are sure though others act beside them. docs/diagnosis/model.md, section 10.
+//! What an unknown departure looks like: a jump, bump, period, resonance, rough function or memory, with its
+//! place, size and odds; and which causes are sure though others act beside them. docs/diagnosis/model.md, section 10.
 
 use crate::decision::{Decision, Verdict};
 use crate::fitted::Fitted;
@@ -18,7 +18,8 @@ pub struct Description {
     pub structure: ShapeKind,
     /// The covariate over which it is.
     pub covariate: &'static str,
-    /// Place of a jump or bump, length of a period, in the covariate's unit.
+    /// Place of a jump, bump or resonance, length of a period or within which a rough function changes, in
+    /// the covariate's unit. Of a memory the mean from which it counts, or its reach over the position.
     pub at: f64,
     /// Its 95 % interval.
     pub at_ci95: [f64; 2],
@@ -68,13 +69,23 @@ fn words(shape: &Shape) -> String {
     let value = |v: f64| three_digits(v * factor);
     let [low, high] = shape.at.1.map(value);
     let (at, over) = (value(shape.at.0), shape.covariate.words);
+    let interval = format!("(95 %: {low} to {high})");
     let place = match shape.kind {
-        ShapeKind::Jump => format!("a jump over {over} at {at} {unit}"),
-        ShapeKind::Bump => format!("a bump over {over} about {at} {unit}"),
-        ShapeKind::Period => format!("a period of {at} {unit} over {over}"),
+        ShapeKind::Jump => format!("a jump over {over} at {at} {unit} {interval}"),
+        ShapeKind::Bump => format!("a bump over {over} about {at} {unit} {interval}"),
+        ShapeKind::Period => format!("a period of {at} {unit} over {over} {interval}"),
+        ShapeKind::Resonance => format!("a resonance over {over} at {at} {unit} {interval}"),
+        ShapeKind::Rough => {
+            format!("a rough function of {over}, which changes within {at} {unit} {interval},")
+        }
+        ShapeKind::Memory => format!("a memory of the {over} of the pass before"),
     };
     let of = if shape.turns { "friction" } else { "the lateral reading, alike in both directions" };
-    format!("{place} (95 %: {low} to {high}) in {of}, {:+.3} of full friction", shape.size.0)
+    let size = match shape.kind {
+        ShapeKind::Rough => format!("{:.3} of full friction (root mean square)", shape.size.0),
+        _ => format!("{:+.3} of full friction", shape.size.0),
+    };
+    format!("{place} in {of}, {size}")
 }
 
 /// The structures of an unknown departure, best first; none under another verdict.
@@ -96,8 +107,15 @@ pub fn description(fitted: &Fitted, decision: &Decision) -> Vec<Description> {
         log10_odds_vs_no_gap: shape.nats / base10,
         text: words(shape),
     };
-    let seen = fitted.shapes.iter().map(of);
-    seen.take_while(|d| d.log10_odds_vs_no_gap > LEAST_ODDS).take(MOST).collect()
+    // One that acts on friction in several ways is one structure: the best of them is described.
+    let mut seen: Vec<Description> = Vec::new();
+    for described in fitted.shapes.iter().map(of).take_while(|d| d.log10_odds_vs_no_gap > LEAST_ODDS) {
+        let again = |d: &Description| (d.structure, d.covariate) == (described.structure, described.covariate);
+        if seen.len() < MOST && !seen.iter().any(again) {
+            seen.push(described);
+        }
+    }
+    seen
 }
 
 /// The likeliest cause under `unknown`, and why it is not named; none where no effect could be tried.

@@ -6,7 +6,7 @@
 use crate::constants::Constants;
 use crate::data::Table;
 use crate::fit::Problem;
-use crate::gaussian::{Covariance, HALF_LN_2PI, Scaled, log_sum_exp};
+use crate::gaussian::{Covariance, HALF_LN_2PI, Scaled, log_sum_exp, rows_times};
 use crate::kernel::{COUNT, Coordinates, Kernel, Lengths};
 use crate::layout::NUISANCES;
 use models::condition::Condition;
@@ -29,12 +29,10 @@ pub fn lengths(k: &Constants, table: &Table) -> Vec<Lengths> {
     });
     let coordinates = Coordinates::of(table);
     let (sees, alone) = (coordinates.climate().next().is_some(), k.discrepancy_lengths[0]);
-    let each = coordinates.varying().map(|only| Lengths {
-        condition: alone,
-        time: alone,
-        position: alone,
-        climate: f64::INFINITY,
-        seen: std::array::from_fn(|k| k == only),
+    let far = f64::INFINITY;
+    let each = coordinates.varying().map(|only| {
+        let seen = std::array::from_fn(|k| k == only);
+        Lengths { condition: alone, time: alone, position: alone, climate: far, seen }
     });
     all.filter(|l| sees || !l.climate.is_finite()).chain(each).collect()
 }
@@ -79,7 +77,7 @@ fn rows(
     let mut sizes = Vec::with_capacity(passes.len());
     for (i, p) in passes.iter().enumerate() {
         let size = scale(baseline[i], mu0 * p.normal_force_n);
-        let basis = kernel.basis(&coordinates.place(p, problem.design.largest_amplitude_m, lengths));
+        let basis = kernel.basis(&coordinates.place(p, lengths));
         for (j, b) in basis.iter().enumerate() {
             phi[(i, j)] = parts.0 * p.direction.sign() * size * b;
             phi[(i, r + j)] = parts.1 * size * b;
@@ -91,9 +89,7 @@ fn rows(
         moved[k] += STEP;
         let there = problem.predict_at(&[], &moved, passes);
         moved[k] = center[k];
-        for i in 0..passes.len() {
-            phi[(i, 2 * r + k)] = (there[i] - baseline[i]) / STEP;
-        }
+        phi.set_column(2 * r + k, &((there - &baseline) / STEP));
     }
     (baseline, phi, sizes)
 }
@@ -119,8 +115,7 @@ impl Linear {
     pub fn about(table: &Table, problem: &Problem, center: &[f64], lengths: Lengths) -> Self {
         let k = &problem.constants;
         let coordinates = Coordinates::of(table);
-        let largest = problem.design.largest_amplitude_m;
-        let places: Vec<_> = problem.passes.iter().map(|p| coordinates.place(p, largest, &lengths)).collect();
+        let places: Vec<_> = problem.passes.iter().map(|p| coordinates.place(p, &lengths)).collect();
         let kernel = Kernel::new(&places, k.discrepancy_rank, k.kernel_rest);
         let (baseline, columns, sizes) =
             rows(problem, center, &problem.passes, &coordinates, (&kernel, &lengths), (1.0, 1.0));
@@ -150,16 +145,15 @@ impl Discrepancy {
             Linear::about(table, problem, center, lengths);
         let r = kernel.rank();
         let n = problem.len();
+        let with_white = |white: f64| -> Vec<f64> {
+            problem.variance.iter().zip(&sizes).map(|(v, size)| v + (white * size).powi(2)).collect()
+        };
         let mut all = Vec::new();
         let mut best = (f64::NEG_INFINITY, 0.0, 0.0, 0.0);
         for white in k.discrepancy_white {
-            let variance: Vec<f64> =
-                (0..n).map(|i| problem.variance[i] + (white * sizes[i]).powi(2)).collect();
+            let variance = with_white(white);
             let sqrt: DVector<f64> = DVector::from_iterator(n, variance.iter().map(|v| 1.0 / v.sqrt()));
-            let mut whitened = problem.beside_common(&phi);
-            for mut c in whitened.column_iter_mut() {
-                c.component_mul_assign(&sqrt);
-            }
+            let whitened = rows_times(problem.beside_common(&phi), &sqrt);
             let z = residual.component_mul(&sqrt);
             let t = whitened.transpose();
             let gram = &t * &whitened;
@@ -193,8 +187,7 @@ impl Discrepancy {
             scaled.column_mut(j).scale_mut(friction);
             scaled.column_mut(r + j).scale_mut(odd);
         }
-        let variance: Vec<f64> = (0..n).map(|i| problem.variance[i] + (white * sizes[i]).powi(2)).collect();
-        let covariance = Covariance::new(&variance, &problem.beside_common(&scaled));
+        let covariance = Covariance::new(&with_white(white), &problem.beside_common(&scaled));
         let weights = covariance.weights(&residual).rows(0, scaled.ncols()).into_owned();
         let smooth = baseline
             - scaled.columns(2 * r, NUISANCES) * DVector::from_column_slice(&center[..NUISANCES])

@@ -45,12 +45,9 @@ pub fn predictions(result: &Diagnosis, conditions: &Table) -> Result<String, Uns
          lateral_force_in_run_n,lateral_force_in_run_sd_n\n",
     );
     for (point, f) in conditions.points.iter().zip(result.predict(conditions)?) {
-        let cells = if f.baseline.is_nan() {
-            ",,,,".to_string()
-        } else {
-            let cells = [f.baseline, f.corrected, f.corrected_sd, f.in_run, f.in_run_sd];
-            cells.map(|c| format!("{c:e}")).join(",")
-        };
+        let known = !f.baseline.is_nan();
+        let cells = [f.baseline, f.corrected, f.corrected_sd, f.in_run, f.in_run_sd];
+        let cells = cells.map(|c| if known { format!("{c:e}") } else { String::new() }).join(",");
         text.push_str(&format!("{point},{cells}\n"));
     }
     Ok(text)

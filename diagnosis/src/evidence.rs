@@ -193,7 +193,8 @@ fn log_half_line(reach: f64, beyond: f64) -> f64 {
     }
 }
 
-fn equations(
+/// Curvature and gradient of half the cost, prior included.
+pub(crate) fn equations(
     covariance: &Covariance,
     jacobian: &DMatrix<f64>,
     residual: &DVector<f64>,

@@ -1,12 +1,13 @@
 //! A hypothesis on a table, in coordinates that are N(0, 1) a priori. docs/diagnosis/model.md, section 2.
 
+use crate::bases::beside_each_other;
 use crate::constants::Constants;
 use crate::data::RigFile;
 use crate::gaussian::{Covariance, HALF_LN_2PI};
 use crate::law::Law;
 use crate::layout::{Layout, NUISANCES};
 pub use crate::member::Member;
-use effects::{Active, Baseline, Design, Input, Parameter, library};
+use effects::{Active, Baseline, Contact, Design, Input, Parameter, library};
 use models::condition::Condition;
 use models::rig_file::CertifiedKey;
 use nalgebra::{DMatrix, DVector};
@@ -158,11 +159,7 @@ impl Problem {
             constants: self.constants.clone(),
             law: self.law.clone(),
             own: self.own.clone(),
-            beside: if self.law.is_some() {
-                rows.iter().map(|&i| self.beside[i]).collect()
-            } else {
-                Vec::new()
-            },
+            beside: rows.iter().filter(|_| self.law.is_some()).map(|&i| self.beside[i]).collect(),
             ..*self
         }
     }
@@ -192,10 +189,7 @@ impl Problem {
 
     /// The columns of `phi`, and after them those of the scatter that passes have in common.
     pub fn beside_common(&self, phi: &DMatrix<f64>) -> DMatrix<f64> {
-        let (own, common) = (phi.ncols(), self.common.ncols());
-        let mut all = phi.clone().resize_horizontally(own + common, 0.0);
-        all.columns_mut(own, common).copy_from(&self.common);
-        all
+        beside_each_other(phi, &self.common)
     }
 
     /// chi2 of a residual: what scatter does not explain. Its expectation is the number of passes.
@@ -273,51 +267,48 @@ impl Problem {
 
     /// Predicted lateral forces, N.
     pub fn predict(&self, members: &[Member], u: &[f64]) -> DVector<f64> {
-        let mut forces = self.slider(members, u, &self.passes);
-        forces.iter_mut().zip(&self.beside).for_each(|(force, [beside, _])| *force += beside);
-        forces
+        self.slider_beside_law(members, u, None)
     }
 
     /// Predicted lateral forces at other conditions, N; NaN where the base law cannot tell.
     pub fn predict_at(&self, members: &[Member], u: &[f64], passes: &[Condition]) -> DVector<f64> {
-        let mut forces = self.slider(members, u, passes);
+        let mut forces = self.slider(members, u, passes, None);
         if let Some(law) = &self.law {
             forces.iter_mut().zip(passes).for_each(|(force, p)| *force += self.beside(law, p)[0]);
         }
         forces
     }
 
-    /// The spring-slider's forces, N.
-    fn slider(&self, members: &[Member], u: &[f64], passes: &[Condition]) -> DVector<f64> {
-        let force = if self.rough { effects::rough_lateral_force } else { effects::lateral_force };
-        self.slider_by(members, u, passes, force)
+    /// The forces at the passes of the problem, N, with an input beside its value where one is given.
+    fn slider_beside_law(&self, members: &[Member], u: &[f64], moved: Option<(Input, f64)>) -> DVector<f64> {
+        let mut forces = self.slider(members, u, &self.passes, moved);
+        forces.iter_mut().zip(&self.beside).for_each(|(force, [beside, _])| *force += beside);
+        forces
     }
 
-    /// The same by one way to compute a force.
-    fn slider_by(
+    /// The spring-slider's forces, N.
+    fn slider(
         &self,
         members: &[Member],
         u: &[f64],
         passes: &[Condition],
-        force: impl Fn(&Baseline, &[Active<'_>], &Condition, &Design) -> f64,
+        moved: Option<(Input, f64)>,
     ) -> DVector<f64> {
         let baseline = self.baseline(u);
         let thetas = self.thetas(members, u);
         // Effects act in the library's order, whatever the order of the hypothesis.
         let mut order: Vec<usize> = (0..members.len()).collect();
         order.sort_by_key(|&k| members[k]);
-        let active: Vec<Active<'_>> = order
-            .into_iter()
-            .map(|k| Active {
-                effect: effects::at(members[k].effect),
-                law: members[k].law,
-                theta: &thetas[k],
-            })
-            .collect();
-        DVector::from_iterator(
-            passes.len(),
-            passes.iter().map(|p| force(&baseline, &active, p, &self.design)),
-        )
+        let active = |k: usize| {
+            let Member { effect, law } = members[k];
+            Active { effect: effects::at(effect), law, theta: &thetas[k] }
+        };
+        let active: Vec<Active<'_>> = order.into_iter().map(active).collect();
+        let force = |p: &Condition| {
+            let contact = Contact { coarse: self.rough, ..baseline.contact(p, &self.design) };
+            effects::read(contact, &active, moved, p, &self.design)
+        };
+        DVector::from_iterator(passes.len(), passes.iter().map(force))
     }
 
     /// Change of the predictions for a unit of an input, as [`effects::Input`] has it, with the hypothesis
@@ -330,12 +321,7 @@ impl Problem {
         input: Input,
     ) -> DVector<f64> {
         let step = STEPS[1] * if input == Input::Load { self.design.reference_load_n } else { 1.0 };
-        let with = |b: &Baseline, a: &[Active<'_>], p: &Condition, d: &Design| {
-            effects::lateral_force_with(b, a, (input, step), p, d)
-        };
-        let mut there = self.slider_by(members, u, &self.passes, with);
-        there.iter_mut().zip(&self.beside).for_each(|(force, [beside, _])| *force += beside);
-        (there - at) / step
+        (self.slider_beside_law(members, u, Some((input, step))) - at) / step
     }
 
     /// Change of the predictions for a unit of a member's size, in its coordinate.

@@ -17,10 +17,7 @@ impl Covariance {
     /// Factors the covariance. `phi` may have no columns.
     pub fn new(variance: &[f64], phi: &DMatrix<f64>) -> Self {
         let inverse_sd = DVector::from_iterator(variance.len(), variance.iter().map(|v| 1.0 / v.sqrt()));
-        let mut whitened = phi.clone();
-        for mut column in whitened.column_iter_mut() {
-            column.component_mul_assign(&inverse_sd);
-        }
+        let whitened = rows_times(phi.clone(), &inverse_sd);
         let mut gram = whitened.transpose() * &whitened;
         for i in 0..gram.nrows() {
             gram[(i, i)] += 1.0;
@@ -88,12 +85,14 @@ impl Covariance {
     }
 
     fn scale(&self, m: &DMatrix<f64>) -> DMatrix<f64> {
-        let mut m = m.clone();
-        for mut column in m.column_iter_mut() {
-            column.component_mul_assign(&self.inverse_sd);
-        }
-        m
+        rows_times(m.clone(), &self.inverse_sd)
     }
+}
+
+/// A matrix with each row times its factor.
+pub(crate) fn rows_times(mut matrix: DMatrix<f64>, factors: &DVector<f64>) -> DMatrix<f64> {
+    matrix.column_iter_mut().for_each(|mut column| column.component_mul_assign(factors));
+    matrix
 }
 
 /// A covariance `I + Phi S S Phi'` of whitened data for scales `S` of the columns, from products that stay

@@ -83,11 +83,8 @@ pub fn fit_all(table: &Table, rig: &RigFile, options: &Options) -> Fitted {
     Arc::make_mut(&mut alone.constants).slow_nats = f64::INFINITY;
     let mut independent = fit_believing(table, rig, &alone, &Belief::Judged);
     independent.problem.constants = options.constants.clone();
-    if independent.best_evidence() + lasting.scatter.slow_cost > lasting.best_evidence() {
-        independent
-    } else {
-        lasting
-    }
+    let better = independent.best_evidence() + lasting.scatter.slow_cost > lasting.best_evidence();
+    if better { independent } else { lasting }
 }
 
 /// The same with a belief about which passes belong.

@@ -1,13 +1,15 @@
 //! Parameter intervals by profile likelihood, with their shape. docs/diagnosis/model.md, section 10.
 
 use crate::bases::Basis;
-use crate::evidence::Posterior;
-use crate::fit::Problem;
+use crate::evidence::{Posterior, equations};
+use crate::fit::{Member, Problem};
 use crate::gaussian::Covariance;
 use crate::layout::{Layout, NUISANCES};
 use crate::least_squares::bounded_step;
+use effects::Parameter;
 use nalgebra::DVector;
 use serde::Serialize;
+use std::ops::Range;
 
 /// Shape of a profile.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, schemars::JsonSchema)]
@@ -48,33 +50,23 @@ pub fn estimates(problem: &Problem, best: &Posterior, basis: &Basis) -> Vec<Vec<
     let covariance = problem.covariance(&best.change.columns(basis, best.freedom.share));
     let floor = cost(problem, best, &covariance, &best.u, &best.prediction);
     let precision = problem.prior_precision(&best.members);
-    best.members
-        .iter()
-        .zip(Layout::of(&best.members).members())
-        .map(|(member, places)| {
-            member
-                .parameters(&problem.design)
-                .iter()
-                .zip(places)
-                .map(|(p, k)| {
-                    let bounds = p.coordinate_bounds();
-                    let ends =
-                        [-1.0, 1.0].map(|side| end(problem, best, &covariance, floor, k, side, bounds));
-                    let value = p.value(best.u[k]);
-                    let [low, high] = ends.map(|e| e.unwrap_or(f64::NAN));
-                    let shape = match (ends[0], ends[1]) {
-                        _ if assumed(problem, best, &precision, k) => Shape::Prior,
-                        (Some(_), Some(_)) => Shape::Bounded,
-                        (None, None) => Shape::Flat,
-                        _ => Shape::OneSided,
-                    };
-                    let low = if low.is_nan() { bounds.0 } else { low };
-                    let high = if high.is_nan() { bounds.1 } else { high };
-                    Estimate { name: p.name, value, ci95: [p.value(low), p.value(high)], unit: p.unit, shape }
-                })
-                .collect()
-        })
-        .collect()
+    let one = |(p, k): (Parameter, usize)| {
+        let bounds = p.coordinate_bounds();
+        let [low, high] = [-1.0, 1.0].map(|side| end(problem, best, &covariance, floor, k, side, bounds));
+        let shape = match (low, high) {
+            _ if assumed(problem, best, &precision, k) => Shape::Prior,
+            (Some(_), Some(_)) => Shape::Bounded,
+            (None, None) => Shape::Flat,
+            _ => Shape::OneSided,
+        };
+        let at = |end: Option<f64>, bound: f64| p.value(end.filter(|u| !u.is_nan()).unwrap_or(bound));
+        let ci95 = [at(low, bounds.0), at(high, bounds.1)];
+        Estimate { name: p.name, value: p.value(best.u[k]), ci95, unit: p.unit, shape }
+    };
+    let own = |(member, places): (&Member, Range<usize>)| -> Vec<Estimate> {
+        member.parameters(&problem.design).into_iter().zip(places).map(one).collect()
+    };
+    best.members.iter().zip(Layout::of(&best.members).members()).map(own).collect()
 }
 
 /// Intervals from the curvature at the mode, for hypotheses that do not lead.
@@ -184,15 +176,9 @@ fn profile(
     for _ in 0..4 {
         let mut jacobian = problem.jacobian(&best.members, &u, &m);
         jacobian.column_mut(k).fill(0.0);
-        let mut joined = jacobian.insert_columns(u.len(), 1, 0.0);
-        joined.set_column(u.len(), &(&y - &m));
-        let all = covariance.inner(&joined, &joined);
-        let d = u.len();
-        let mut hessian = all.view((0, 0), (d, d)).into_owned();
-        for i in 0..d {
-            hessian[(i, i)] += precision[i].max(1e-9);
-        }
-        let gradient = DVector::from_fn(d, |i, _| -all[(i, d)] + precision[i] * u[i]);
+        let (mut hessian, gradient) = equations(covariance, &jacobian, &(&y - &m), &precision, &u);
+        // What a uniform prior does not bound stays finite.
+        (0..u.len()).filter(|i| precision[*i] == 0.0).for_each(|i| hessian[(i, i)] += 1e-9);
         let Some(mut next) = bounded_step(&hessian, &gradient, 1e-6, &u, &bounds) else { break };
         next[k] = value_at;
         let there = problem.predict(&best.members, &next);

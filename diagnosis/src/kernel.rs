@@ -39,14 +39,8 @@ impl Lengths {
 /// Lengths of the form uncertainty in standard deviations of each covariate; a form does not depend on the
 /// place.
 pub fn form_lengths(k: &Constants) -> Lengths {
-    let far = f64::INFINITY;
-    Lengths {
-        condition: k.form_length,
-        time: k.form_length,
-        position: far,
-        climate: far,
-        seen: [true; COUNT],
-    }
+    let (length, far) = (k.form_length, f64::INFINITY);
+    Lengths { condition: length, time: length, position: far, climate: far, seen: [true; COUNT] }
 }
 
 /// Standardised covariates of passes.
@@ -55,6 +49,7 @@ pub struct Coordinates {
     mean: [f64; COUNT],
     /// Zero where the table says nothing of a covariate.
     sd: [f64; COUNT],
+    largest_amplitude: f64,
 }
 
 /// Deviations of a covariate beyond which a place counts as the edge of the design.
@@ -79,13 +74,10 @@ impl Coordinates {
 
     fn from(table: &Table, of_its_own: f64) -> Self {
         let n = table.len() as f64;
-        let largest = table.design.largest_amplitude_m;
-        let mut mean = [0.0; COUNT];
-        let mut sd = [0.0; COUNT];
+        let largest_amplitude = table.design.largest_amplitude_m;
+        let (mut mean, mut sd) = ([0.0; COUNT], [0.0; COUNT]);
         for (k, c) in SMOOTH.iter().enumerate() {
-            let all: Option<Vec<f64>> =
-                table.passes.iter().map(|p| c.of(p).map(|v| c.scaled(v, largest))).collect();
-            let Some(values) = all else { continue };
+            let Some(values) = scaled(c, &table.passes, largest_amplitude) else { continue };
             mean[k] = values.iter().sum::<f64>() / n;
             sd[k] = (values.iter().map(|v| (v - mean[k]).powi(2)).sum::<f64>() / n).sqrt();
             let own = match c.role {
@@ -96,7 +88,7 @@ impl Coordinates {
                 sd[k] = 0.0;
             }
         }
-        Self { mean, sd }
+        Self { mean, sd, largest_amplitude }
     }
 
     /// Temperature and humidity, where they change in a way that time does not tell.
@@ -112,20 +104,25 @@ impl Coordinates {
 
     /// Standardised covariates divided by the lengths. What a condition does not say is taken as the table's
     /// mean.
-    pub fn place(&self, p: &Condition, largest_amplitude: f64, lengths: &Lengths) -> [f64; COUNT] {
+    pub fn place(&self, p: &Condition, lengths: &Lengths) -> [f64; COUNT] {
         std::array::from_fn(|k| {
             let c = SMOOTH[k];
             let length = lengths.of(k);
             match c.of(p) {
                 Some(value) if self.sd[k] > 1e-12 && length.is_finite() => {
                     // What lies far outside the design counts as its edge.
-                    let place = (c.scaled(value, largest_amplitude) - self.mean[k]) / self.sd[k];
+                    let place = (c.scaled(value, self.largest_amplitude) - self.mean[k]) / self.sd[k];
                     place.clamp(-EDGE_SD, EDGE_SD) / length
                 }
                 _ => 0.0,
             }
         })
     }
+}
+
+/// Values of a covariate on its scale; none of one that some passes lack.
+pub(crate) fn scaled(c: &Covariate, passes: &[Condition], largest_amplitude: f64) -> Option<Vec<f64>> {
+    passes.iter().map(|p| c.of(p).map(|v| c.scaled(v, largest_amplitude))).collect()
 }
 
 /// Standard deviation of what a cubic in time leaves of the values.
@@ -160,25 +157,18 @@ impl Kernel {
         let mut columns: Vec<Vec<f64>> = Vec::new();
         let mut chosen: Vec<usize> = Vec::new();
         for _ in 0..rank.min(n) {
-            let (pivot, &top) = left
-                .iter()
-                .enumerate()
-                .max_by(|a, b| a.1.total_cmp(b.1).then(b.0.cmp(&a.0)))
-                .expect("a table has passes");
+            let most = left.iter().enumerate().max_by(|a, b| a.1.total_cmp(b.1).then(b.0.cmp(&a.0)));
+            let (pivot, &top) = most.expect("a table has passes");
             if top < rest {
                 break;
             }
             let root = top.sqrt();
-            let column: Vec<f64> = (0..n)
-                .map(|i| {
-                    let k = correlation(&places[i], &places[pivot]);
-                    let seen: f64 = columns.iter().map(|c| c[i] * c[pivot]).sum();
-                    (k - seen) / root
-                })
-                .collect();
-            for i in 0..n {
-                left[i] = (left[i] - column[i] * column[i]).max(0.0);
-            }
+            let at = |i: usize| {
+                let seen: f64 = columns.iter().map(|c| c[i] * c[pivot]).sum();
+                (correlation(&places[i], &places[pivot]) - seen) / root
+            };
+            let column: Vec<f64> = (0..n).map(at).collect();
+            left.iter_mut().zip(&column).for_each(|(left, c)| *left = (*left - c * c).max(0.0));
             left[pivot] = 0.0;
             chosen.push(pivot);
             columns.push(column);

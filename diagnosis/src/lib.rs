@@ -16,7 +16,7 @@
 //! | [`starts`], [`singles`], [`pairs`], [`hypotheses`] | global starts; one cause, two causes, all with their probabilities |
 //! | [`left_out`] | extrapolation to left-out regions of the operating space |
 //! | [`fitted`], [`decision`] | probabilities; the verdict rule |
-//! | [`structure`] | jumps, bumps, periods and other departures that no smooth map follows |
+//! | [`structure`] | jumps, bumps, periods, memories and other departures that no smooth map follows |
 //! | [`intervals`], [`pulls`] | profile intervals; how far the stiffnesses went from their calibration |
 //! | [`locate`] | which part of the operating space, and of the rig, carries the gap |
 //! | [`shrinkage`], [`predict`], [`novelty`], `run_shifts` | held-out passes; predictions, also in runs |

@@ -2,7 +2,7 @@
 
 mod partition;
 
-use crate::data::RigFile;
+use crate::data::{RigFile, range};
 use crate::decision::Decision;
 use crate::fitted::Fitted;
 use crate::predict::{Forecast, Model, forecast};
@@ -119,8 +119,7 @@ fn region(
         // An open side ends where the table does.
         let (word, (scale, unit)) = (covariate.words, covariate.shown);
         let seen: Vec<f64> = passes.iter().filter_map(|p| covariate.of(p)).collect();
-        let (low, high) =
-            seen.iter().fold((f64::INFINITY, f64::NEG_INFINITY), |(a, c), v| (a.min(*v), c.max(*v)));
+        let [low, high] = range(seen.iter().copied());
         let slack = 0.02 * (high - low);
         let low = if low >= 0.0 { (low - slack).max(0.0) } else { low - slack };
         let high = high + slack;
@@ -133,11 +132,7 @@ fn region(
         };
         let words_of = match (b[0].is_finite(), b[1].is_finite()) {
             (forward, _) if covariate.name == covariate::DIRECTION.name => {
-                if forward {
-                    "forward".into()
-                } else {
-                    "backward".into()
-                }
+                ["backward", "forward"][usize::from(forward)].into()
             }
             (true, true) => format!("{word} {} to {} {unit}", bound(low, high), bound(high, low)),
             (true, false) => format!("{word} above {} {unit}", bound(low, b[1])),
@@ -202,19 +197,18 @@ fn conditions_between(passes: &[Condition], count: usize) -> Vec<Condition> {
     };
     let pick = |u: f64| passes[((u * passes.len() as f64) as usize).min(passes.len() - 1)];
     (0..count)
-        .map(|_| Condition {
-            amplitude: PeakToPeak::from_metres(between(
-                pick(uniform()).amplitude.metres(),
-                &amplitudes,
-                (uniform(), uniform()),
-            )),
-            speed_m_s: between(pick(uniform()).speed_m_s, &speeds, (uniform(), uniform())),
-            normal_force_n: between(pick(uniform()).normal_force_n, &loads, (uniform(), uniform())),
-            frequency_hz: pick(uniform()).frequency_hz,
-            direction: pick(uniform()).direction,
-            position_m: pick(uniform()).position_m,
-            ambient_pressure_pa: pick(uniform()).ambient_pressure_pa,
-            ..pick(uniform())
+        .map(|_| {
+            let w = between(pick(uniform()).amplitude.metres(), &amplitudes, (uniform(), uniform()));
+            Condition {
+                amplitude: PeakToPeak::from_metres(w),
+                speed_m_s: between(pick(uniform()).speed_m_s, &speeds, (uniform(), uniform())),
+                normal_force_n: between(pick(uniform()).normal_force_n, &loads, (uniform(), uniform())),
+                frequency_hz: pick(uniform()).frequency_hz,
+                direction: pick(uniform()).direction,
+                position_m: pick(uniform()).position_m,
+                ambient_pressure_pa: pick(uniform()).ambient_pressure_pa,
+                ..pick(uniform())
+            }
         })
         .collect()
 }

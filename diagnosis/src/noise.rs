@@ -10,6 +10,7 @@ use models::condition::Condition;
 use models::covariate;
 use models::quantity::PeakToPeak;
 use serde::Serialize;
+use std::collections::BTreeMap;
 
 /// What the replicates say about the stated repeatability.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize, schemars::JsonSchema)]
@@ -69,25 +70,18 @@ pub fn settle(
 }
 
 fn rough(problem: &Problem, rig: &RigFile) -> Vec<f64> {
-    problem
-        .lateral
-        .iter()
-        .zip(&problem.passes)
-        .map(|(l, p)| {
-            let level = l.abs() + ROUGH_LEVEL * problem.nominal.mu0 * p.normal_force_n;
-            (ROUGH_SD * level).powi(2) + rig.noise.force_sd_n.powi(2)
-        })
-        .collect()
+    let one = |(l, p): (&f64, &Condition)| {
+        let level = l.abs() + ROUGH_LEVEL * problem.nominal.mu0 * p.normal_force_n;
+        (ROUGH_SD * level).powi(2) + rig.noise.force_sd_n.powi(2)
+    };
+    problem.lateral.iter().zip(&problem.passes).map(one).collect()
 }
 
 /// Variances given the level of friction: relative scatter, noise of the lateral axis, and that of the normal
 /// axis through the slope of the prediction (effective variance).
 pub fn variance(problem: &Problem, rig: &RigFile, center: &[f64], level: &[f64], factor: f64) -> Vec<f64> {
-    let heavier: Vec<_> = problem
-        .passes
-        .iter()
-        .map(|p| Condition { normal_force_n: p.normal_force_n * (1.0 + LOAD_STEP), ..*p })
-        .collect();
+    let heavier = |p: &Condition| Condition { normal_force_n: p.normal_force_n * (1.0 + LOAD_STEP), ..*p };
+    let heavier: Vec<_> = problem.passes.iter().map(heavier).collect();
     let base = problem.predict(&[], center);
     let more = problem.predict_at(&[], center, &heavier);
     let force = rig.noise.force_sd_n;
@@ -105,8 +99,7 @@ pub fn variance(problem: &Problem, rig: &RigFile, center: &[f64], level: &[f64],
 /// Repeats of one condition, compared among themselves after a common drift in time is taken out; and, where
 /// they leave it open, the scatter about the baseline if that is all there is.
 fn replicates(table: &Table, problem: &Problem, variance: &[f64], scatter: &Scatter) -> PureError {
-    let mut groups: std::collections::BTreeMap<[Option<i64>; 6], Vec<usize>> =
-        std::collections::BTreeMap::new();
+    let mut groups: BTreeMap<[Option<i64>; 6], Vec<usize>> = BTreeMap::new();
     for (i, p) in table.passes.iter().enumerate() {
         let own = table.in_its_loads(p);
         let key = covariate::SETTINGS.map(|c| Some(c.level?(c.of(&own)?)));
@@ -140,11 +133,8 @@ fn replicates(table: &Table, problem: &Problem, variance: &[f64], scatter: &Scat
     let repeated = repeated.clamp(k.variance_factor_bounds[0], k.variance_factor_bounds[1]);
     let used =
         repeated * (scatter.bare_scale.powi(2) / repeated).max(1.0).powf(believed(k, scatter, sum, freedom));
-    PureError {
-        degrees_of_freedom: freedom,
-        variance_ratio: (freedom > 0).then(|| sum / freedom as f64),
-        used,
-    }
+    let variance_ratio = (freedom > 0).then(|| sum / freedom as f64);
+    PureError { degrees_of_freedom: freedom, variance_ratio, used }
 }
 
 /// How far a scatter about the recalibrated baseline is scatter, and no structure that no surface follows:

@@ -91,25 +91,20 @@ pub fn pulls(problem: &Problem, none: &Posterior, model: &Posterior) -> Vec<Pull
         (nominal.normal_stiffness_n_per_m, on_normal * fitted.normal_stiffness_n_per_m),
         (nominal.lateral_stiffness_n_per_m, on_lateral * fitted.lateral_stiffness_n_per_m),
     ];
-    STIFFNESSES
-        .iter()
-        .zip(values)
-        .enumerate()
-        .map(|(i, (&quantity, (stated_n_per_m, fitted_n_per_m)))| {
-            // Coordinates are standard normal a priori: mu0 first, then the stiffnesses.
-            let at = i + 1;
-            let contraction = 1.0 - judged.covariance[(at, at)];
-            Pull {
-                quantity,
-                stated_n_per_m,
-                fitted_n_per_m,
-                stated_relative_sd: problem.prior_sd[at],
-                pull_sd: (contraction > problem.constants.least_contraction)
-                    .then(|| judged.u[at] / contraction.sqrt()),
-                imitated_by: imitators(at),
-            }
-        })
-        .collect()
+    // Coordinates are standard normal a priori: mu0 first, then the stiffnesses.
+    let pull = |(at, (quantity, (stated_n_per_m, fitted_n_per_m)))| {
+        let contraction = 1.0 - judged.covariance[(at, at)];
+        let seen = contraction > problem.constants.least_contraction;
+        Pull {
+            quantity,
+            stated_n_per_m,
+            fitted_n_per_m,
+            stated_relative_sd: problem.prior_sd[at],
+            pull_sd: seen.then(|| judged.u[at] / contraction.sqrt()),
+            imitated_by: imitators(at),
+        }
+    };
+    (1..).zip(STIFFNESSES.into_iter().zip(values)).map(pull).collect()
 }
 
 /// Whether a member is an error of the finger's calibration: a change of the baseline itself.

@@ -4,7 +4,8 @@ use crate::bases::Bends;
 use crate::data::{RigFile, Table};
 use crate::decision::{Decision, Verdict, decide};
 use crate::describe::probability;
-use crate::hypotheses::{Fitted, Options, fit_believing};
+use crate::hypotheses::{Candidate, Fitted, Options, fit_believing};
+use crate::kernel::scaled;
 use crate::scatter::{Belief, Scatter};
 use models::covariate::{AMPLITUDE, Role, SMOOTH};
 use models::quantity::PeakToPeak;
@@ -62,10 +63,9 @@ const STRUCTURED: f64 = 0.01;
 pub fn of_table(fitted: &Fitted, table: &Table, decision: &Decision) -> Vec<String> {
     let mut remarks = Vec::new();
     if decision.leader().is_none() {
-        remarks.push(
-            "No effect of the library could be tried on this table: `not_testable` says what is missing."
-                .into(),
-        );
+        let text =
+            "No effect of the library could be tried on this table: `not_testable` says what is missing.";
+        remarks.push(text.into());
     }
     if table.still_coefficient().is_none() {
         remarks.push("No pass has the plate still: mu0 is unknown and was fitted; add w = 0 passes.".into());
@@ -121,13 +121,18 @@ fn silent_regions(fitted: &Fitted, decision: &Decision) -> Option<String> {
     })
 }
 
+/// The leading cause of a verdict that names one.
+fn led_by<'a>(fitted: &'a Fitted, decision: &Decision) -> Option<&'a Candidate> {
+    let led = matches!(decision.verdict, Verdict::Named | Verdict::Ambiguous);
+    Some(&fitted.candidates[decision.leader().filter(|_| led)?])
+}
+
 /// Nats by which a bent cause must explain the table better than its law for the law to be called another.
 const BENT_NATS: f64 = 5.0;
 
 /// Says of a named cause that the table speaks against its law.
 fn bent(fitted: &Fitted, decision: &Decision) -> Option<String> {
-    let led = matches!(decision.verdict, Verdict::Named | Verdict::Ambiguous);
-    let leader = &fitted.candidates[decision.leader().filter(|_| led)?];
+    let leader = led_by(fitted, decision)?;
     let nats = leader.best.log_evidence - leader.best.plain.as_ref()?.log_evidence;
     let of = leader.best.members.iter().filter(|m| leader.best.change.bends(m.effect)).map(|m| {
         let effect = effects::at(m.effect);
@@ -156,8 +161,7 @@ const PARTED: f64 = 0.8;
 
 /// Settings that the leading cause needs and that have two levels: that it acts shows, its law does not.
 fn two_levels(fitted: &Fitted, table: &Table, decision: &Decision) -> Option<String> {
-    let led = matches!(decision.verdict, Verdict::Named | Verdict::Ambiguous);
-    let leader = &fitted.candidates[decision.leader().filter(|_| led)?];
+    let leader = led_by(fitted, decision)?;
     let needs = leader.effects.iter().flat_map(|e| effects::at(*e).needs);
     let largest = table.design.largest_amplitude_m;
     let mut words: Vec<&str> = needs
@@ -191,9 +195,7 @@ fn together(table: &Table) -> Vec<String> {
         .iter()
         .filter(|c| c.role != Role::Climate)
         .filter_map(|c| {
-            let values: Option<Vec<f64>> =
-                table.passes.iter().map(|p| c.of(p).map(|v| c.scaled(v, largest))).collect();
-            let mut values = values?;
+            let mut values = scaled(c, &table.passes, largest)?;
             let n = values.len() as f64;
             let mean = values.iter().sum::<f64>() / n;
             values.iter_mut().for_each(|v| *v -= mean);
@@ -226,10 +228,10 @@ pub fn of_scatter(fitted: &Fitted, decision: &Decision, with_suspects: Option<&W
         remarks.push(format!(
             "Passes scatter {:.2} times as much as rig.toml states; the measured scatter was used.{}",
             scatter.scale,
-            if fitted.pure.variance_ratio.is_none() {
-                " A deviation that looks like scatter would do the same: repeat some conditions to tell."
-            } else {
-                ""
+            match fitted.pure.variance_ratio {
+                None =>
+                    " A deviation that looks like scatter would do the same: repeat some conditions to tell.",
+                Some(_) => "",
             }
         ));
     }

@@ -17,6 +17,7 @@ mod serial;
 mod surface;
 mod suspects;
 
+use crate::bases::beside_each_other;
 use crate::constants::Constants;
 use crate::data::Table;
 use crate::discrepancy::lengths;
@@ -147,18 +148,17 @@ pub fn estimate(
     for round in 0..ROUNDS {
         if ALL_SMOOTHNESSES.contains(&round) {
             let fits: Vec<(f64, State)> =
-                surfaces.par_iter().map(|s| s.climbed(k, &variance, &weight, &level, state)).collect();
+                surfaces.par_iter().map(|s| s.climbed(&variance, &weight, &level, state)).collect();
             best = (0..fits.len()).fold(0, |b, i| if fits[i].0 > fits[b].0 { i } else { b });
             state = fits[best].1;
         } else {
-            state = surfaces[best].climbed(k, &variance, &weight, &level, state).1;
+            state = surfaces[best].climbed(&variance, &weight, &level, state).1;
         }
-        let seen = surfaces[best].seen(k, &variance, &weight, &level, &state);
+        let seen = surfaces[best].seen(&variance, &weight, &level, &state);
+        let judged = || suspects::weights(k, &suspects::responsibilities(k, &seen.left_out), &seen.left_out);
         let next = match belief {
             Belief::Judged if round < HEAVY => suspects::heavy(&seen.left_out),
-            Belief::Judged => {
-                suspects::weights(k, &suspects::responsibilities(k, &seen.left_out), &seen.left_out)
-            }
+            Belief::Judged => judged(),
             _ => weight.clone(),
         };
         let moved = next.iter().zip(&weight).map(|(a, b)| (a - b).abs()).fold(0.0, f64::max);
@@ -169,7 +169,7 @@ pub fn estimate(
         }
     }
     let surface = &surfaces[best];
-    let seen = surface.seen(k, &variance, &weight, &level, &state);
+    let seen = surface.seen(&variance, &weight, &level, &state);
     let space = clusters::Space::of(problem);
     let (deviations, outside, together_in) = match belief {
         Belief::Judged => {
@@ -181,13 +181,11 @@ pub fn estimate(
         Belief::AboutCause { deviations, outside } => (deviations.clone(), outside.clone(), None),
     };
     let weight = suspects::weights(k, &outside, &deviations);
-    let (whole, bare) = (
-        surface.climbed(k, &variance, &weight, &level, state).0,
-        surface.bare(k, &variance, &weight, &level, &state),
-    );
+    let (whole, _) = surface.climbed(&variance, &weight, &level, state);
+    let bare = surface.bare(&variance, &weight, &level, &state);
     // A scatter about the baseline has no mean of its own anywhere.
     let bounded = |(d, w): (&f64, &f64)| (d / w.sqrt()).clamp(-suspects::BOUNDED_SD, suspects::BOUNDED_SD);
-    let about = surface.seen(k, &variance, &weight, &level, &bare.1).beside;
+    let about = surface.seen(&variance, &weight, &level, &bare.1).beside;
     let beside: Vec<f64> = about.iter().zip(&weight).map(bounded).collect();
     let along = beside.iter().zip(&problem.passes).map(|(d, p)| d * p.direction.sign()).collect();
     let clustered = space.cluster(&[beside, along], &[]).p;
@@ -265,11 +263,9 @@ impl Scatter {
         problem.variance.iter_mut().for_each(|v| *v *= share);
         problem.common = common;
         if let Some(sd) = self.run_relative_sd.filter(|sd| *sd > 0.0) {
-            let first = problem.common.ncols();
-            let mut common = std::mem::replace(&mut problem.common, DMatrix::zeros(0, 0));
-            common = common.resize_horizontally(first + table.run_count, 0.0);
-            (0..problem.len()).for_each(|i| common[(i, first + table.runs[i])] = sd * self.under[i]);
-            problem.common = common;
+            let mut shifts = DMatrix::zeros(problem.len(), table.run_count);
+            (0..problem.len()).for_each(|i| shifts[(i, table.runs[i])] = sd * self.under[i]);
+            problem.common = beside_each_other(&problem.common, &shifts);
         }
     }
 

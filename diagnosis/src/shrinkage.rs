@@ -4,6 +4,7 @@ use crate::data::{RigFile, Table};
 use crate::draws::{deviate, split_mix};
 use crate::fitted::Fitted;
 use crate::predict::{Answer, forecast, model};
+use models::condition::Condition;
 use models::covariate;
 use rayon::prelude::*;
 use serde::Serialize;
@@ -57,26 +58,19 @@ pub fn groups(table: &Table, folds: usize) -> Vec<usize> {
         return table.runs.clone();
     }
     // Conditions with all their replicates, in an order that keeps neighbours together, cut into blocks.
-    let mut keyed: Vec<([Option<i64>; 5], usize)> = table
-        .passes
-        .iter()
-        .enumerate()
-        .map(|(i, p)| {
-            let own = table.in_its_loads(p);
-            let key = covariate::NEIGHBOURS.map(|c| Some(c.neighbourhood?(c.of(&own)?)));
-            (key, i)
-        })
-        .collect();
+    let key = |p: &Condition| {
+        let own = table.in_its_loads(p);
+        covariate::NEIGHBOURS.map(|c| Some(c.neighbourhood?(c.of(&own)?)))
+    };
+    let mut keyed: Vec<_> = table.passes.iter().map(key).zip(0..).collect();
     keyed.sort();
     let blocks = (table.len() / BLOCK).clamp(folds * 2, MOST_BLOCKS.max(folds * 2));
-    let mut group = vec![0; table.len()];
-    let mut block = 0;
-    let mut filled = 0;
+    let mut group = vec![0_usize; table.len()];
+    let (mut block, mut filled) = (0, 0);
     for (k, (key, i)) in keyed.iter().enumerate() {
         let fresh = k > 0 && keyed[k - 1].0 != *key;
         if fresh && filled * blocks >= table.len() {
-            block += 1;
-            filled = 0;
+            (block, filled) = (block + 1, 0);
         }
         group[*i] = block;
         filled += 1;
@@ -119,21 +113,13 @@ pub fn gap(fitted: &Fitted, table: &Table, rig: &RigFile, answer: &Answer) -> Ga
     let mut sums: std::collections::BTreeMap<usize, ([f64; 5], f64)> = std::collections::BTreeMap::new();
     for (group, weight, e) in per_fold.into_iter().flatten() {
         let entry = sums.entry(group).or_default();
-        for k in 0..5 {
-            entry.0[k] += e[k];
-        }
+        entry.0.iter_mut().zip(e).for_each(|(sum, e)| *sum += e);
         entry.1 += weight;
     }
     let list: Vec<([f64; 5], f64)> = sums.into_values().collect();
     let mean = |list: &[([f64; 5], f64)]| {
         let n: f64 = list.iter().map(|g| g.1).sum::<f64>().max(f64::MIN_POSITIVE);
-        let mut m = [0.0; 5];
-        for g in list {
-            for k in 0..5 {
-                m[k] += g.0[k] / n;
-            }
-        }
-        m
+        list.iter().fold([0.0; 5], |m, (sums, _)| std::array::from_fn(|k| m[k] + sums[k] / n))
     };
     let all = mean(&list);
     let shrink = |m: &[f64; 5]| {

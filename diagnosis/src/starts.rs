@@ -1,5 +1,6 @@
 //! Global starts: a scan of each law, then fits of the best few. docs/diagnosis/model.md, section 7.
 
+use crate::departure::weighted;
 use crate::fit::{Member, Problem};
 use crate::gaussian::Covariance;
 use crate::layout::NUISANCES;
@@ -58,25 +59,16 @@ fn grid(parameters: &[Parameter], stroke: f64) -> Vec<Vec<f64>> {
                 // Two wavelengths differ on a stroke if they differ by half a period over it.
                 let step = WAVE_STEP / stroke.max(1e-4);
                 let count = (((1.0 / a - 1.0 / b) / step).ceil() as usize).clamp(4, 240);
-                (0..=count)
-                    .map(|i| p.coordinate(1.0 / (1.0 / b + (1.0 / a - 1.0 / b) * i as f64 / count as f64)))
-                    .collect()
+                let waves = |i: usize| 1.0 / b + (1.0 / a - 1.0 / b) * i as f64 / count as f64;
+                (0..=count).map(|i| p.coordinate(1.0 / waves(i))).collect()
             }
             // A phase is cyclic over the unit interval inside its bounds.
             Prior::Uniform(..) if fine => [0.0, 0.2, 0.4, 0.6, 0.8].map(|x| p.coordinate(x)).to_vec(),
             Prior::Uniform(..) => vec![-2.4, -1.2, 0.0, 1.2, 2.4],
         };
         let values: Vec<f64> = values.into_iter().filter(|v| *v >= low && *v <= high).collect();
-        list = list
-            .iter()
-            .flat_map(|head| {
-                values.iter().map(|v| {
-                    let mut row = head.clone();
-                    row.push(*v);
-                    row
-                })
-            })
-            .collect();
+        list =
+            list.iter().flat_map(|head| values.iter().map(|v| [head.as_slice(), &[*v]].concat())).collect();
     }
     list
 }
@@ -94,8 +86,9 @@ pub struct Sought {
 
 /// Seeks a law alone beside given coordinates of the baseline: a scan, and the first rounds from its best places.
 pub fn seek(problem: &Problem, member: Member, nuisances: &[f64], variance: &[f64]) -> Sought {
-    let (rows, scored) = scanned(problem, &[member], nuisances, variance);
-    let fits = begun(problem, &[member], nuisances.len(), variance, &rows, &scored, STARTS.0);
+    let hunt = Hunt { problem, members: &[member], variance };
+    let (rows, scored) = hunt.scanned(nuisances);
+    let fits = hunt.begun(nuisances.len(), &rows, &scored, STARTS.0);
     Sought { rows, fits, of: problem.len() }
 }
 
@@ -107,29 +100,14 @@ impl Sought {
 
     /// Local optima on all rows, or on as many as a start is refined on, best first.
     pub fn finished(self, problem: &Problem, member: Member, variance: &[f64]) -> Vec<Fit> {
-        finished(problem, &[member], variance, &self.rows, self.fits, STARTS.1)
+        Hunt { problem, members: &[member], variance }.finished(&self.rows, self.fits, STARTS.1)
     }
 
     /// The best place as it is, of a law that is far behind.
     pub fn as_it_is(self, problem: &Problem, member: Member, variance: &[f64]) -> Vec<Fit> {
         let best = self.fits.get(..1).unwrap_or_default();
-        refined(problem, &[member], variance, best, 0)
+        Hunt { problem, members: &[member], variance }.refined(best, 0)
     }
-}
-
-/// The whole grid of the last member, on the rows that show it: those rows, and every place with its cost, best first.
-fn scanned(
-    problem: &Problem,
-    members: &[Member],
-    fixed: &[f64],
-    variance: &[f64],
-) -> (Vec<usize>, Vec<(f64, Vec<f64>)>) {
-    let parameters = members.last().map_or_else(Vec::new, |m| m.parameters(&problem.design));
-    let fine = parameters.iter().any(is_wavelength);
-    let some = if members.len() > 1 { PAIR_SCAN_ROWS } else { SCAN_ROWS };
-    let rows = rows(problem.len(), if fine { WAVE_SCAN_ROWS } else { some });
-    let scored = scan(problem, members, fixed, variance, &rows, grid(&parameters, problem.design.stroke_m));
-    (rows, scored)
 }
 
 /// Best cost of a coarse scan of the last member about coordinates that it had alone, with the place it was found.
@@ -152,7 +130,8 @@ pub fn coarse_scan(
         list.push(tail);
     }
     let rows = rows(problem.len(), PAIR_SCAN_ROWS);
-    let (cost, u) = scan(problem, members, fixed, variance, &rows, list).into_iter().next()?;
+    let scored = Hunt { problem, members, variance }.scan(fixed, &rows, list);
+    let (cost, u) = scored.into_iter().next()?;
     Some((of_all(cost, problem, &rows), u))
 }
 
@@ -168,7 +147,7 @@ pub fn full_scan(
     fixed: &[f64],
     variance: &[f64],
 ) -> Option<(f64, Vec<f64>)> {
-    let (rows, scored) = scanned(problem, members, fixed, variance);
+    let (rows, scored) = Hunt { problem, members, variance }.scanned(fixed);
     let (cost, u) = scored.into_iter().next()?;
     Some((of_all(cost, problem, &rows), u))
 }
@@ -177,8 +156,9 @@ pub fn full_scan(
 pub fn refine_from(problem: &Problem, members: &[Member], start: Vec<f64>, variance: &[f64]) -> Option<Fit> {
     let rows = rows(problem.len(), SCAN_ROWS);
     let fixed = start.len() - members.last()?.count();
-    let fits = begun(problem, members, fixed, variance, &rows, &[(0.0, start)], 1);
-    finished(problem, members, variance, &rows, fits, 1).into_iter().next()
+    let hunt = Hunt { problem, members, variance };
+    let fits = hunt.begun(fixed, &rows, &[(0.0, start)], 1);
+    hunt.finished(&rows, fits, 1).into_iter().next()
 }
 
 /// At most so many rows, one from each of as many even blocks, at a place in it that steps by the golden
@@ -195,126 +175,124 @@ fn rows(n: usize, limit: usize) -> Vec<usize> {
     (0..limit).map(row).collect()
 }
 
-fn scan(
-    problem: &Problem,
-    members: &[Member],
-    fixed: &[f64],
-    variance: &[f64],
-    rows: &[usize],
-    grid: Vec<Vec<f64>>,
-) -> Vec<(f64, Vec<f64>)> {
-    let part = problem.sketch(rows);
-    let part_variance: Vec<f64> = rows.iter().map(|&i| variance[i]).collect();
-    // Nuisances (and the other members) follow linearly while the scan walks.
-    let others = &members[..members.len() - 1];
-    let origin = part.predict(others, fixed);
-    let jacobian = part.jacobian(others, fixed, &origin);
-    let plain = Covariance::new(&part_variance, &DMatrix::zeros(rows.len(), 0));
-    let mut hessian = plain.inner(&jacobian, &jacobian);
-    let precision = problem.prior_precision(others);
-    for (k, p) in precision.iter().enumerate() {
-        hessian[(k, k)] += p.max(1e-9);
+/// A law, alone or beside others, on a problem with these variances.
+#[derive(Clone, Copy)]
+struct Hunt<'a> {
+    problem: &'a Problem,
+    members: &'a [Member],
+    variance: &'a [f64],
+}
+
+impl Hunt<'_> {
+    fn part(&self, rows: &[usize]) -> (Problem, Vec<f64>) {
+        (self.problem.sketch(rows), rows.iter().map(|&i| self.variance[i]).collect())
     }
-    // What the others cost where they are: nuisances that were driven far from their calibration are no bargain.
-    let pull = DVector::from_iterator(fixed.len(), fixed.iter().zip(&precision).map(|(x, p)| p * x));
-    let penalty = pull.dot(&DVector::from_column_slice(fixed));
-    let Some(factor) = hessian.cholesky() else { return Vec::new() };
-    let mut weighted = jacobian.clone();
-    for (i, v) in part_variance.iter().enumerate() {
-        weighted.row_mut(i).scale_mut(1.0 / *v);
+
+    /// The whole grid of the last member, on the rows that show it: those rows, and every place with its
+    /// cost, best first.
+    fn scanned(&self, fixed: &[f64]) -> (Vec<usize>, Vec<(f64, Vec<f64>)>) {
+        let Hunt { problem, members, .. } = self;
+        let parameters = members.last().map_or_else(Vec::new, |m| m.parameters(&problem.design));
+        let fine = parameters.iter().any(is_wavelength);
+        let some = if members.len() > 1 { PAIR_SCAN_ROWS } else { SCAN_ROWS };
+        let rows = rows(problem.len(), if fine { WAVE_SCAN_ROWS } else { some });
+        let scored = self.scan(fixed, &rows, grid(&parameters, problem.design.stroke_m));
+        (rows, scored)
     }
-    let project = weighted.transpose();
-    let y = DVector::from_column_slice(&part.lateral);
-    let mut scored: Vec<(f64, Vec<f64>)> = grid
-        .into_iter()
-        .map(|tail| {
-            let mut u = fixed.to_vec();
-            u.extend(&tail);
-            let residual = &y - part.predict(members, &u);
-            let score = &project * &residual - &pull;
-            let step = factor.solve(&score);
-            let misfit: f64 = residual.iter().zip(&part_variance).map(|(r, v)| r * r / v).sum();
-            let cost = misfit + penalty - score.dot(&step);
-            for (k, s) in step.iter().enumerate() {
-                u[k] += s.clamp(-LONGEST_STEP, LONGEST_STEP);
+
+    /// Every place of a grid of the last member with its cost, best first.
+    fn scan(&self, fixed: &[f64], rows: &[usize], grid: Vec<Vec<f64>>) -> Vec<(f64, Vec<f64>)> {
+        let members = self.members;
+        let (part, part_variance) = self.part(rows);
+        // Nuisances (and the other members) follow linearly while the scan walks.
+        let others = &members[..members.len() - 1];
+        let origin = part.predict(others, fixed);
+        let jacobian = part.jacobian(others, fixed, &origin);
+        let plain = Covariance::new(&part_variance, &DMatrix::zeros(rows.len(), 0));
+        let mut hessian = plain.inner(&jacobian, &jacobian);
+        let precision = self.problem.prior_precision(others);
+        for (k, p) in precision.iter().enumerate() {
+            hessian[(k, k)] += p.max(1e-9);
+        }
+        // What the others cost where they are: nuisances that were driven far from their calibration are no bargain.
+        let pull = DVector::from_iterator(fixed.len(), fixed.iter().zip(&precision).map(|(x, p)| p * x));
+        let penalty = pull.dot(&DVector::from_column_slice(fixed));
+        let Some(factor) = hessian.cholesky() else { return Vec::new() };
+        let project = weighted(&jacobian, &part_variance);
+        let y = DVector::from_column_slice(&part.lateral);
+        let mut scored: Vec<(f64, Vec<f64>)> = grid
+            .into_iter()
+            .map(|tail| {
+                let mut u = [fixed, &tail].concat();
+                let residual = &y - part.predict(members, &u);
+                let score = &project * &residual - &pull;
+                let step = factor.solve(&score);
+                let misfit: f64 = residual.iter().zip(&part_variance).map(|(r, v)| r * r / v).sum();
+                let cost = misfit + penalty - score.dot(&step);
+                for (k, s) in step.iter().enumerate() {
+                    u[k] += s.clamp(-LONGEST_STEP, LONGEST_STEP);
+                }
+                (cost, u)
+            })
+            .collect();
+        scored.sort_by(|a, b| a.0.total_cmp(&b.0));
+        scored
+    }
+
+    /// The first rounds from the best places of a scan that differ.
+    fn begun(&self, fixed: usize, rows: &[usize], scored: &[(f64, Vec<f64>)], count: usize) -> Vec<Fit> {
+        let (part, part_variance) = self.part(rows);
+        // Starts that differ: in the size's sign, or by more than one step of any shape.
+        let mut starts: Vec<&Vec<f64>> = Vec::new();
+        for (_, u) in scored {
+            let fresh = starts.iter().all(|s| {
+                (fixed..u.len()).any(|k| (u[k] - s[k]).abs() > if k == fixed { OTHER.0 } else { OTHER.1 })
+            });
+            if fresh {
+                starts.push(u);
             }
-            (cost, u)
-        })
-        .collect();
-    scored.sort_by(|a, b| a.0.total_cmp(&b.0));
-    scored
-}
-
-/// The first rounds from the best places of a scan that differ.
-fn begun(
-    problem: &Problem,
-    members: &[Member],
-    fixed: usize,
-    variance: &[f64],
-    rows: &[usize],
-    scored: &[(f64, Vec<f64>)],
-    count: usize,
-) -> Vec<Fit> {
-    let part = problem.sketch(rows);
-    let part_variance: Vec<f64> = rows.iter().map(|&i| variance[i]).collect();
-    // Starts that differ: in the size's sign, or by more than one step of any shape.
-    let mut starts: Vec<&Vec<f64>> = Vec::new();
-    for (_, u) in scored {
-        let fresh = starts.iter().all(|s| {
-            (fixed..u.len()).any(|k| (u[k] - s[k]).abs() > if k == fixed { OTHER.0 } else { OTHER.1 })
-        });
-        if fresh {
-            starts.push(u);
+            if starts.len() == count {
+                break;
+            }
         }
-        if starts.len() == count {
-            break;
+        let mut fits: Vec<Fit> =
+            starts.into_iter().map(|u| minimise(&part, self.members, u, &part_variance, ROUNDS.0)).collect();
+        fits.sort_by(|a, b| a.cost.total_cmp(&b.cost));
+        fits
+    }
+
+    /// The further rounds of those that may still win, and the last ones on all rows.
+    fn finished(&self, rows: &[usize], mut fits: Vec<Fit>, count: usize) -> Vec<Fit> {
+        let (part, part_variance) = self.part(rows);
+        // What is far behind by now does not catch up.
+        let ahead = fits.first().map_or(0.0, |f| f.cost);
+        fits.retain(|f| f.cost < BEHIND.0 * ahead + BEHIND.1);
+        distinct(&mut fits);
+        fits.truncate(count + 1);
+        for f in &mut fits {
+            *f = minimise(&part, self.members, &f.u, &part_variance, ROUNDS.1);
         }
+        fits.sort_by(|a, b| a.cost.total_cmp(&b.cost));
+        let best = fits.first().map_or(0.0, |f| f.cost);
+        fits.retain(|f| f.cost < FAR_BEHIND.0 * best + FAR_BEHIND.1);
+        distinct(&mut fits);
+        fits.truncate(count);
+        let mut whole = self.refined(&fits, ROUNDS.2);
+        whole.sort_by(|a, b| a.cost.total_cmp(&b.cost));
+        whole
     }
-    let mut fits: Vec<Fit> =
-        starts.into_iter().map(|u| minimise(&part, members, u, &part_variance, ROUNDS.0)).collect();
-    fits.sort_by(|a, b| a.cost.total_cmp(&b.cost));
-    fits
-}
 
-/// The further rounds of those that may still win, and the last ones on all rows.
-fn finished(
-    problem: &Problem,
-    members: &[Member],
-    variance: &[f64],
-    rows: &[usize],
-    mut fits: Vec<Fit>,
-    count: usize,
-) -> Vec<Fit> {
-    let part = problem.sketch(rows);
-    let part_variance: Vec<f64> = rows.iter().map(|&i| variance[i]).collect();
-    // What is far behind by now does not catch up.
-    let ahead = fits.first().map_or(0.0, |f| f.cost);
-    fits.retain(|f| f.cost < BEHIND.0 * ahead + BEHIND.1);
-    distinct(&mut fits);
-    fits.truncate(count + 1);
-    for f in &mut fits {
-        *f = minimise(&part, members, &f.u, &part_variance, ROUNDS.1);
+    /// Fits continued on the whole table, or on so many rows of a large one, their costs as of all of it.
+    fn refined(&self, fits: &[Fit], rounds: usize) -> Vec<Fit> {
+        let many = rows(self.problem.len(), REFINED_ROWS);
+        let part = self.problem.select(&many);
+        let part_variance: Vec<f64> = many.iter().map(|&i| self.variance[i]).collect();
+        let on = |f: &Fit| {
+            let fit = minimise(&part, self.members, &f.u, &part_variance, rounds);
+            Fit { cost: of_all(fit.cost, self.problem, &many), ..fit }
+        };
+        fits.iter().map(on).collect()
     }
-    fits.sort_by(|a, b| a.cost.total_cmp(&b.cost));
-    let best = fits.first().map_or(0.0, |f| f.cost);
-    fits.retain(|f| f.cost < FAR_BEHIND.0 * best + FAR_BEHIND.1);
-    distinct(&mut fits);
-    fits.truncate(count);
-    let mut whole = refined(problem, members, variance, &fits, ROUNDS.2);
-    whole.sort_by(|a, b| a.cost.total_cmp(&b.cost));
-    whole
-}
-
-/// Fits continued on the whole table, or on so many rows of a large one, their costs as of all of it.
-fn refined(problem: &Problem, members: &[Member], variance: &[f64], fits: &[Fit], rounds: usize) -> Vec<Fit> {
-    let many = rows(problem.len(), REFINED_ROWS);
-    let part = problem.select(&many);
-    let part_variance: Vec<f64> = many.iter().map(|&i| variance[i]).collect();
-    let on = |f: &Fit| {
-        let fit = minimise(&part, members, &f.u, &part_variance, rounds);
-        Fit { cost: of_all(fit.cost, problem, &many), ..fit }
-    };
-    fits.iter().map(on).collect()
 }
 
 /// Leaves one fit, the best, of those that converged to the same place.

@@ -6,8 +6,11 @@
 //! statistic), a periodogram over time and place what repeats. The level is that of the family; its tail is
 //! that of the largest of many (Gumbel).
 
+mod axis;
+mod factor;
 mod form;
 pub mod laid;
+mod places;
 pub mod shapes;
 
 use crate::evidence::Posterior;
@@ -104,8 +107,7 @@ fn looks(problem: &Problem) -> Vec<Look> {
     let n = problem.len();
     let mut list = Vec::new();
     for c in COVARIATES {
-        let values: Option<Vec<f64>> = problem.passes.iter().map(|p| c.of(p)).collect();
-        let Some(values) = values else { continue };
+        let Some(values) = c.of_all(&problem.passes) else { continue };
         let mut order: Vec<usize> = (0..n).collect();
         order.sort_by(|&a, &b| values[a].total_cmp(&values[b]));
         let (first, last) = (values[order[0]], values[order[n - 1]]);
@@ -114,11 +116,8 @@ fn looks(problem: &Problem) -> Vec<Look> {
         }
         if matches!(c.role, Role::Time | Role::Place) {
             let places = order.iter().map(|&i| (values[i] - first) / (last - first)).collect();
-            list.push(Look {
-                words: format!("a period in {}", c.words),
-                order: order.clone(),
-                places: Some(places),
-            });
+            let words = format!("a period in {}", c.words);
+            list.push(Look { words, order: order.clone(), places: Some(places) });
         }
         list.push(Look { words: format!("a stretch of {}", c.words), order, places: None });
     }

@@ -144,20 +144,17 @@ fn none(against: Against, all: usize, visible: usize) -> Comparison {
         _ => format!("{visible} of {all} {what} show a change of friction; at least {FEWEST} are needed"),
     };
     let text = format!("{}: not judged. {because}", title(against));
-    let (causes, forms, mean) = Default::default();
-    let (late_s, ci95_s, log10_odds_vs_none) = (None, None, None);
-    let because = Some(because);
     Comparison {
         against,
         edges: visible,
-        late_s,
-        ci95_s,
-        log10_odds_vs_none,
-        causes,
-        forms,
-        because,
+        late_s: None,
+        ci95_s: None,
+        log10_odds_vs_none: None,
+        causes: Vec::new(),
+        forms: Vec::new(),
+        because: Some(because),
         text,
-        mean,
+        mean: Vec::new(),
     }
 }
 

@@ -32,11 +32,10 @@ pub(crate) fn unstated(fitted: &Fitted, answer: &Answer, conditions: &Table) -> 
 fn needed(fitted: &Fitted, which: Which) -> Vec<(&'static Covariate, String)> {
     match which {
         Which::Baseline => Vec::new(),
-        Which::Open => fitted
-            .discrepancy
-            .climate()
-            .map(|c| (c, "the smooth map of what is unknown".to_string()))
-            .collect(),
+        Which::Open => {
+            let climate = fitted.discrepancy.climate();
+            climate.map(|c| (c, "the smooth map of what is unknown".to_string())).collect()
+        }
         Which::Shape(i) => {
             let shape = &fitted.shapes[i];
             vec![(shape.covariate, format!("a shape over {}", shape.covariate.words))]

@@ -59,6 +59,12 @@ pub struct NotTestable {
     pub because: String,
 }
 
+impl NotTestable {
+    fn of((effect, because): &(&'static str, String)) -> Self {
+        NotTestable { effect: (*effect).to_string(), because: because.clone() }
+    }
+}
+
 /// What the leader did on regions that were left out of its fit.
 #[derive(Debug, Clone, PartialEq, Serialize, schemars::JsonSchema)]
 pub struct LeftOut {
@@ -179,14 +185,11 @@ pub fn diagnose(table: &Table, rig: &RigFile, options: &Options, sha256: String)
     let best = leader.map(|l| &fitted.candidates[l].best);
     let answer = Answer::of(&fitted, decision.verdict, leader);
     let gap = gap(&fitted, table, rig, &answer);
-    let location = Where {
-        place: ledger(&fitted, &decision),
-        regions: if decision.verdict == Verdict::NoGap {
-            Vec::new()
-        } else {
-            regions(&fitted, rig, &model(&fitted, table, &answer, None))
-        },
+    let regions = match decision.verdict {
+        Verdict::NoGap => Vec::new(),
+        _ => regions(&fitted, rig, &model(&fitted, table, &answer, None)),
     };
+    let location = Where { place: ledger(&fitted, &decision), regions };
     let leading = best.filter(|_| decision.verdict != Verdict::NoGap);
     let parameters = leading.map(|best| estimates(&fitted.problem, best.by_law(), &fitted.basis));
     let hypotheses = hypotheses(&fitted, &decision, parameters.as_ref());
@@ -197,10 +200,8 @@ pub fn diagnose(table: &Table, rig: &RigFile, options: &Options, sha256: String)
     let mut remarks: Vec<String> = options.law.iter().map(|law| law.remark()).collect();
     let own: Vec<&str> = options.own.iter().map(|e| effects::at(*e).name).collect();
     if !own.is_empty() {
-        remarks.push(format!(
-            "Beside the library, causes of the user's own were candidates: {}.",
-            own.join(", ")
-        ));
+        let own = own.join(", ");
+        remarks.push(format!("Beside the library, causes of the user's own were candidates: {own}."));
     }
     remarks.extend(of_table(&fitted, table, &decision));
     remarks.extend(of_scatter(&fitted, &decision, with_suspects.as_ref()));
@@ -239,11 +240,7 @@ pub fn diagnose(table: &Table, rig: &RigFile, options: &Options, sha256: String)
         stiffness_pulls,
         description: description(&fitted, &decision),
         at_least: at_least(&fitted, &decision),
-        not_testable: fitted
-            .not_testable
-            .iter()
-            .map(|(e, because)| NotTestable { effect: (*e).to_string(), because: because.clone() })
-            .collect(),
+        not_testable: fitted.not_testable.iter().map(NotTestable::of).collect(),
         seen_from,
         psi_reading,
         record: None,
@@ -345,22 +342,16 @@ fn hypotheses(
         .enumerate()
         .filter(|(i, c)| decision.probabilities[*i] > LISTED || c.effects.len() == 1)
         .map(|(i, c)| {
-            let own = if decision.class.contains(&i) {
-                let mut class = vec![label(fitted, i)];
-                class.extend(decision.class.iter().filter(|&&k| k != i).map(|&k| label(fitted, k)));
-                class
-            } else {
-                vec![label(fitted, i)]
-            };
-            let parameters = if Some(i) == decision.leader() && parameters.is_some() {
-                parameters.map(|p| p.concat()).unwrap_or_default()
-            } else {
-                curvature(&fitted.problem, c.best.by_law())
+            let class = decision.class.iter().filter(|_| decision.class.contains(&i));
+            let others = class.filter(|&&k| k != i).map(|&k| label(fitted, k));
+            let parameters = match parameters.filter(|_| Some(i) == decision.leader()) {
+                Some(profiled) => profiled.concat(),
+                None => curvature(&fitted.problem, c.best.by_law()),
             };
             Hypothesis {
                 effects: c.names().iter().map(|n| (*n).to_string()).collect(),
                 probability: decision.probabilities[i],
-                alias_class: own,
+                alias_class: std::iter::once(label(fitted, i)).chain(others).collect(),
                 laws: c.best.members.iter().map(|m| m.form().name.to_string()).collect(),
                 parameters,
             }
@@ -380,9 +371,7 @@ fn hypotheses(
         });
     }
     let total: f64 = list.iter().map(|h| h.probability).sum();
-    for h in &mut list {
-        h.probability /= total;
-    }
+    list.iter_mut().for_each(|h| h.probability /= total);
     list.sort_by(|a, b| b.probability.total_cmp(&a.probability).then(a.effects.cmp(&b.effects)));
     list
 }
@@ -405,9 +394,8 @@ impl Diagnosis {
         if let Some(late) = late.max_by(|a, b| odds(a).total_cmp(&odds(b))) {
             let causes = late.causes.join(" or ").replace('_', " ");
             let late_ms = 1e3 * late.late_s.unwrap_or_default();
-            let more =
-                format!(" The run's record shows {causes}: the lateral force is {late_ms:.1} ms late.");
-            self.report.text.push_str(&more);
+            let text = &mut self.report.text;
+            *text += &format!(" The run's record shows {causes}: the lateral force is {late_ms:.1} ms late.");
         }
         self.report.record = Some(part);
     }

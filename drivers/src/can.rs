@@ -23,6 +23,7 @@ use std::time::{Duration, Instant};
 /// frame any more, and the link ends.
 pub(super) const WARNS: &str =
     "the CAN controller warns: its error counters are high; check cable and termination";
+pub(super) const LEFT: &str = "the controller left the bus (bus-off); restart it by hand";
 pub(super) const PASSIVE: &str = "the CAN controller is error passive; check cable, termination and bit rate";
 
 /// Opens the bus at an address: an interface of the kernel's (`can0`), or `slcan:PATH`.
@@ -37,10 +38,7 @@ pub fn open(address: &str, bitrate: u32) -> Result<Box<dyn CanPort>, Ended> {
 }
 
 /// Starts the thread of one instrument.
-///
-/// # Errors
-/// Where no thread can be had.
-pub fn spawn(instrument: &InstrumentSetup, session: Session) -> Result<JoinHandle<Closed>, Ended> {
+pub(crate) fn spawn(instrument: &InstrumentSetup, session: Session) -> Result<JoinHandle<Closed>, Ended> {
     let link = session.endpoint.profile().description.link.clone();
     let address = instrument.address.clone();
     let base = instrument.base.or(link.base).unwrap_or(0);
@@ -131,20 +129,15 @@ fn converse(
         if heard.elapsed() > silence {
             return Err(Ended::Timeout(u32::try_from(silence.as_millis()).unwrap_or(u32::MAX)));
         }
-        let next = groups
-            .iter()
-            .filter_map(|g| g.request.as_ref().filter(|_| g.requested_at.is_none()).map(|(_, p)| p.due))
-            .min();
+        let open = groups.iter().filter(|group| group.requested_at.is_none());
+        let next = open.filter_map(|group| group.request.as_ref()).map(|(_, periodic)| periodic.due).min();
         let pause = next
             .map_or(LONGEST_SLEEP, |due| Duration::from_nanos(due.since(session.now()).0).min(LONGEST_SLEEP));
         match port.receive(Instant::now() + pause)? {
-            None => {}
-            Some(CanEvent::BusOff) => {
-                return Err(Ended::Io("the controller left the bus (bus-off); restart it by hand".into()));
-            }
+            None | Some(CanEvent::Other) => {}
+            Some(CanEvent::BusOff) => return Err(Ended::Io(LEFT.into())),
             Some(CanEvent::Passive) => return Err(Ended::Io(PASSIVE.into())),
             Some(CanEvent::Warning) => session.endpoint.health().problem(WARNS),
-            Some(CanEvent::Other) => {}
             Some(CanEvent::Frame(frame, ago)) => {
                 let ago = Nanos(u64::try_from(ago.as_nanos()).unwrap_or(0));
                 let arrived = session.now().since(ago);

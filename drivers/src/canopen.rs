@@ -4,7 +4,7 @@
 //! drive is enabled only while the loop's commands are fresh. A fault is reset when a person opens
 //! the rig, never by itself.
 
-use super::can::{self, PASSIVE, WARNS};
+use super::can::{self, LEFT, PASSIVE, WARNS};
 use super::ended::{Closed, Ended};
 use super::endpoint::{BadFrame, Due};
 use super::off::{self, OFF_ANSWER_MS, OffWay};
@@ -12,7 +12,7 @@ use super::session::{LONGEST_SLEEP, Periodic, Session};
 use super::setup::InstrumentSetup;
 use instruments::bus::{CanEvent, CanPort};
 use instruments::codec::can::CanFrame;
-use instruments::codec::canopen::{self, DriveState, Nmt, SdoAnswer};
+use instruments::codec::canopen::{self, DriveState, SdoAnswer};
 use instruments::profile::FrameKind;
 use instruments::{FrameId, SetId, SignalId};
 use std::convert::Infallible;
@@ -25,10 +25,7 @@ const PROFILE_402: u32 = 402;
 const NOT_ENABLED: u16 = 0x07;
 
 /// Starts the thread of one drive.
-///
-/// # Errors
-/// Where no thread can be had.
-pub fn spawn(instrument: &InstrumentSetup, session: Session) -> Result<JoinHandle<Closed>, Ended> {
+pub(crate) fn spawn(instrument: &InstrumentSetup, session: Session) -> Result<JoinHandle<Closed>, Ended> {
     let link = session.endpoint.profile().description.link.clone();
     let address = instrument.address.clone();
     let node = instrument.base.and_then(|base| u8::try_from(base).ok()).or(link.node).unwrap_or(1);
@@ -156,7 +153,7 @@ impl Master {
         if mode != 3 {
             return Err(Ended::Refused(format!("the drive shows mode {mode}, not 3 (profile velocity)")));
         }
-        self.send(&canopen::nmt(Nmt::Start, self.node))
+        self.send(&canopen::start(self.node))
     }
 
     fn go_on(&mut self, session: &mut Session, heartbeat: Duration) -> Result<Infallible, Ended> {
@@ -199,18 +196,12 @@ impl Master {
                     }
                 }
                 Some(CanEvent::Frame(frame, _)) if frame.id == 0x80 + u32::from(self.node) => {
-                    let code = frame
-                        .data()
-                        .iter()
-                        .take(2)
-                        .rev()
-                        .fold(0_u32, |sum, byte| sum << 8 | u32::from(*byte));
+                    let word = frame.data().iter().take(2).rev();
+                    let code = word.fold(0_u32, |sum, byte| sum << 8 | u32::from(*byte));
                     session.endpoint.alarm(&format!("emergency {code:#06x}"));
                 }
                 Some(CanEvent::BusOff) => {
-                    return Err(Ended::Io(
-                        "the controller left the bus (bus-off); restart it by hand".into(),
-                    ));
+                    return Err(Ended::Io(LEFT.into()));
                 }
                 Some(CanEvent::Passive) => return Err(Ended::Io(PASSIVE.into())),
                 Some(CanEvent::Warning) => session.endpoint.health().problem(WARNS),

@@ -173,22 +173,13 @@ impl Talk {
                 continue;
             }
             let wanted = value / self.profile.description.set[id.0].si.factor;
-            for (block, registers) in self.blocks.put(&self.profile, &[(id, wanted)]) {
-                let described = &self.profile.description.set[id.0];
-                let first = usize::from(described.register);
-                let count = described.number.map_or(1, |number| number.bytes().div_ceil(2));
-                // Only its own registers: the block also holds set-points that nobody requested.
-                let (own, at) = match registers.get(first..first + count) {
-                    Some(own) => (own, block.address + described.register),
-                    None => (&registers[..], block.address),
-                };
-                match wire.write(block.table, at, own) {
-                    Ok(()) => self.taken[index] = Some(*value),
-                    Err(Trouble::Refused(why) | Trouble::Corrupt(why)) => {
-                        problem = Some(format!("{} {value} was refused: {why}", QUANTITIES[index]));
-                    }
-                    Err(Trouble::Ended(ended)) => return Err(ended),
+            let Some((table, at, own)) = self.blocks.put_one(&self.profile, id, wanted) else { continue };
+            match wire.write(table, at, &own) {
+                Ok(()) => self.taken[index] = Some(*value),
+                Err(Trouble::Refused(why) | Trouble::Corrupt(why)) => {
+                    problem = Some(format!("{} {value} was refused: {why}", QUANTITIES[index]));
                 }
+                Err(Trouble::Ended(ended)) => return Err(ended),
             }
         }
         let readings = self.read(wire)?;

@@ -7,13 +7,11 @@ mod orders;
 mod view;
 
 use super::health::Health;
-use super::ports::{
-    self, AmplifierPort, ContactsPort, DriveSetPoint, ForcePort, Link, StagePort, StageSetPoint, SupplyPort,
-    SupplySetPoint,
-};
+use super::mailbox::Mailbox;
+use super::ports::{self, AmplifierPort, ContactsPort, ForcePort, SetPoint, StagePort, States, SupplyPort};
 use super::setup::{AxisSetup, CONTACTS, InstrumentSetup, SetupError};
 use super::timebase::{Counter, DeviceClock, Step};
-use instruments::schema::{Severity, Stamp};
+use instruments::schema::Stamp;
 use instruments::{FrameId, Profile, SetId, SignalId, Values};
 use models::quantity::PeakToPeak;
 pub use orders::Due;
@@ -77,9 +75,9 @@ struct StageSignals {
 
 enum Part {
     Force { lateral: Option<Axis>, normal: Option<Axis>, last: Forces, ring: HeapProd<Forces> },
-    Amplifier { signals: AmplifierSignals, link: Link<AmplifierState, DriveSetPoint> },
-    Stage { signals: StageSignals, link: Link<StageState, StageSetPoint>, dead_weight_n: Option<f64> },
-    Supply { closed: SignalId, link: Link<SupplyState, SupplySetPoint> },
+    Amplifier { signals: AmplifierSignals, states: States<AmplifierState> },
+    Stage { signals: StageSignals, states: States<StageState>, dead_weight_n: Option<f64> },
+    Supply { closed: SignalId, states: States<SupplyState> },
     Contacts(ContactsLink),
 }
 
@@ -113,7 +111,7 @@ impl ContactsLink {
         let contact = [&mut self.last.emergency_stop, &mut self.last.interlock, &mut self.last.dead_man];
         let mut touched = false;
         for (signal, contact) in self.signals.iter().zip(contact) {
-            if let Some(signal) = signal.filter(|signal| view.profile.frame_of(*signal) == view.frame) {
+            if let Some(signal) = signal.filter(|signal| view.holds(*signal)) {
                 *contact = view.channel(signal).map(|reading| Contact {
                     closed: reading.value != 0.0,
                     taken_at: reading.taken_at,
@@ -192,7 +190,7 @@ impl Endpoint {
         let axes = (lateral.is_some(), normal.is_some());
         let (ring, port) = ports::sensor(Forces::missing(NoData::NeverRead));
         let part = Part::Force { lateral, normal, last: Forces::missing(NoData::NotFitted), ring };
-        Ok((Self::new(profile, part), (port, axes)))
+        Ok((Self::new(profile, part, Mailbox::default()), (port, axes)))
     }
 
     /// An amplifier and its port.
@@ -227,8 +225,8 @@ impl Endpoint {
         for set in ["amplitude", "frequency", "enable"] {
             need_set(&profile, set)?;
         }
-        let (link, port) = ports::port();
-        Ok((Self::new(profile, Part::Amplifier { signals, link }), port))
+        let (states, commands, port) = ports::port();
+        Ok((Self::new(profile, Part::Amplifier { signals, states }, commands), port))
     }
 
     /// A stage and its port.
@@ -247,8 +245,8 @@ impl Endpoint {
         if profile.set("load").is_none() && dead_weight_n.is_none() {
             return Err(SetupError::NoLoad);
         }
-        let (link, port) = ports::port();
-        Ok((Self::new(profile, Part::Stage { signals, link, dead_weight_n }), port))
+        let (states, commands, port) = ports::port();
+        Ok((Self::new(profile, Part::Stage { signals, states, dead_weight_n }, commands), port))
     }
 
     /// A switch in the amplifier's supply, and its port.
@@ -258,8 +256,8 @@ impl Endpoint {
     pub fn supply(profile: Profile) -> Result<(Self, SupplyPort), SetupError> {
         let closed = need(&profile, "closed")?;
         need_set(&profile, "closed")?;
-        let (link, port) = ports::port();
-        let endpoint = Self::new(profile, Part::Supply { closed, link });
+        let (states, commands, port) = ports::port();
+        let endpoint = Self::new(profile, Part::Supply { closed, states }, commands);
         if endpoint.safe_set_points().is_empty() {
             return Err(SetupError::NoSafeValue);
         }
@@ -272,10 +270,10 @@ impl Endpoint {
     /// Where the profile has none of their signals.
     pub fn contacts(profile: Profile, setup: &InstrumentSetup) -> Result<(Self, ContactsPort), SetupError> {
         let (link, port) = ContactsLink::of(&profile, setup)?;
-        Ok((Self::new(profile, Part::Contacts(link)), port))
+        Ok((Self::new(profile, Part::Contacts(link), Mailbox::default()), port))
     }
 
-    fn new(profile: Profile, part: Part) -> Self {
+    fn new(profile: Profile, part: Part, commands: Mailbox<SetPoint>) -> Self {
         let stamped = profile.description.time.stamp == Stamp::Device;
         let times = profile.frames().iter().map(|frame| FrameTime {
             clock: frame.device_time.filter(|_| stamped).map(|signal| {
@@ -294,7 +292,7 @@ impl Endpoint {
             seen,
             times,
             part,
-            orders: Orders::default(),
+            orders: Orders::of(commands),
             alarm_until: Nanos(0),
             arrived: Nanos(0),
             held: false,
@@ -399,9 +397,7 @@ impl Endpoint {
             Part::Force { lateral, normal, last, ring } => {
                 let mut touched = false;
                 for (axis, force) in [(lateral, &mut last.lateral), (normal, &mut last.normal)] {
-                    if let Some(axis) =
-                        axis.as_ref().filter(|axis| view.profile.frame_of(axis.signal) == frame)
-                    {
+                    if let Some(axis) = axis.as_ref().filter(|axis| view.holds(axis.signal)) {
                         *force = view.channel(axis.signal).map(|reading| Sample {
                             value: axis.gain * reading.value - axis.offset_n,
                             ..reading
@@ -411,45 +407,41 @@ impl Endpoint {
                 }
                 touched && ring.try_push(*last).is_err()
             }
-            Part::Amplifier { signals, link } if view.profile.frame_of(signals.output_on) == frame => {
-                let flag =
-                    |signal: Option<SignalId>| signal.is_some_and(|signal| view.values.get(signal) != 0.0);
+            Part::Amplifier { signals, states } if view.holds(signals.output_on) => {
                 let state = AmplifierState {
                     amplitude: view.optional(signals.amplitude),
                     echoed_amplitude: PeakToPeak::from_metres(view.si(signals.echo_amplitude)),
                     echoed_frequency_hz: view.si(signals.echo_frequency),
-                    output_on: flag(Some(signals.output_on)),
-                    watchdog_tripped: flag(signals.watchdog_tripped),
-                    fault: alarmed || flag(signals.fault) || view.severity() == Some(Severity::Stop),
+                    output_on: view.flag(Some(signals.output_on)),
+                    watchdog_tripped: view.flag(signals.watchdog_tripped),
+                    fault: alarmed || view.is_faulty(signals.fault),
                     temperature_c: view.optional(signals.temperature),
                     taken_at: mark.taken_at,
                     sequence: mark.sequence,
                 };
                 let vibrates = state.amplitude.is_ok_and(|read| read.value > OFF_AMPLITUDE_PP_M);
                 self.orders.read_back(state.output_on || vibrates, mark.arrived);
-                link.states.try_push(Ok(state)).is_err()
+                states.try_push(Ok(state)).is_err()
             }
-            Part::Stage { signals, link, .. } if view.profile.frame_of(signals.position) == frame => {
-                let flag =
-                    |signal: Option<SignalId>| signal.is_some_and(|signal| view.values.get(signal) != 0.0);
+            Part::Stage { signals, states, .. } if view.holds(signals.position) => {
                 let state = StageState {
                     position_m: view.si(signals.position),
                     velocity_m_s: view.si(signals.velocity),
-                    at_limit: flag(signals.at_limit),
-                    fault: alarmed || flag(signals.fault) || view.severity() == Some(Severity::Stop),
+                    at_limit: view.flag(signals.at_limit),
+                    fault: alarmed || view.is_faulty(signals.fault),
                     taken_at: mark.taken_at,
                     sequence: mark.sequence,
                 };
                 // A velocity that is not a number is none at rest.
                 let rests = state.velocity_m_s.abs() <= AT_REST_M_S;
                 self.orders.read_back(!rests, mark.arrived);
-                link.states.try_push(Ok(state)).is_err()
+                states.try_push(Ok(state)).is_err()
             }
-            Part::Supply { closed, link } if view.profile.frame_of(*closed) == frame => {
+            Part::Supply { closed, states } if view.holds(*closed) => {
                 let closed = view.values.get(*closed) != 0.0;
                 self.orders.read_back(closed, mark.arrived);
                 let state = SupplyState { cut: !closed, taken_at: mark.taken_at, sequence: mark.sequence };
-                link.states.try_push(Ok(state)).is_err()
+                states.try_push(Ok(state)).is_err()
             }
             Part::Contacts(contacts) => match contacts.take(&view) {
                 Some(full) => full,

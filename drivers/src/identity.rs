@@ -63,13 +63,10 @@ fn place(instrument: &InstrumentSetup) -> Result<Option<String>, OpenError> {
             let folder = std::fs::canonicalize(address).unwrap_or_else(|_| address.into());
             Some(format!("folder{}", folder.display()))
         }
-        LinkKind::Udp => {
-            let own = link.local_port.map(|port| format!("udp here/{port}"));
-            own.map_or_else(
-                || socket(address).map(|s| s.map(|socket| format!("udp/{socket}"))),
-                |own| Ok(Some(own)),
-            )?
-        }
+        LinkKind::Udp => match link.local_port {
+            Some(port) => Some(format!("udp here/{port}")),
+            None => socket(address)?.map(|socket| format!("udp/{socket}")),
+        },
         LinkKind::Scpi | LinkKind::Tcp | LinkKind::Serial
             if link.kind != LinkKind::Serial || address.starts_with("tcp:") =>
         {

@@ -130,21 +130,16 @@ pub struct Rig {
 #[derive(Debug, thiserror::Error)]
 #[allow(missing_docs, reason = "the message of an error says what its fields are")]
 pub enum OpenError {
-    /// The setup names a profile that does not exist.
     #[error(
         "no profile is called `{id}`; there are: {known}; looked in: {looked}; a file is named by its path, as in `my-sensor.toml`"
     )]
     UnknownProfile { id: String, known: String, looked: String },
-    /// A profile, or a file that it names, cannot be read.
     #[error("{}: {problem}", file.display())]
     Unreadable { file: std::path::PathBuf, problem: library::FileError },
-    /// One name stands for two profiles.
     #[error("two profiles are called `{id}`: {places}; {remedy}")]
     Ambiguous { id: String, places: String, remedy: String },
-    /// The profile cannot be used.
     #[error("profile `{id}`: {error}")]
     Profile { id: String, error: instruments::ProfileError },
-    /// The setup and the profile do not fit.
     #[error("instrument `{id}` at {address}: {problem}")]
     Mismatch { id: String, address: String, problem: SetupError },
     /// The instrument did not answer, or is not what the profile says.
@@ -153,10 +148,8 @@ pub enum OpenError {
     /// The same of an instrument beside the loop.
     #[error("`{id}` at {address}: {problem}")]
     Beside { id: String, address: String, problem: Ended },
-    /// The profile is not that of a chamber or a gauge.
     #[error("profile `{0}` is not a chamber's: its roles lack `ambient.chamber`")]
     NoChamber(String),
-    /// The chamber has a wire that is not supported.
     #[error("profile `{0}`: a chamber is read over Modbus TCP (`kind = \"modbus_tcp\"`)")]
     ChamberLink(String),
     /// The chamber reads none of [`chamber::QUANTITIES`].
@@ -165,13 +158,11 @@ pub enum OpenError {
     /// The setup does not say which of a vibrometer's decoders it means.
     #[error("`{id}` at {address}: {problem}")]
     Decoder { id: String, address: String, problem: String },
-    /// A vibrometer's settings changed while they were read.
     #[error(
         "`{id}` at {address}: the settings changed while they were read; \
         let nobody touch the controller and ask again"
     )]
     SettingsChanged { id: String, address: String },
-    /// The profile is another instrument's.
     #[error("profile `{0}` is not that of a vibrometer's controller")]
     NoVibrometer(String),
 }

@@ -51,7 +51,8 @@ impl Source {
     /// A file that cannot be read, or a profile that does not hold, with the place.
     pub fn read(origin: &Path) -> Result<Self, OpenError> {
         let unreadable = |file: &Path, problem| OpenError::Unreadable { file: file.into(), problem };
-        let text = text_of(origin).map_err(|problem| unreadable(origin, problem))?;
+        let text = bytes_of(origin).and_then(|bytes| Ok(String::from_utf8(bytes)?));
+        let text = text.map_err(|problem| unreadable(origin, problem))?;
         let named = |error| OpenError::Profile { id: origin.display().to_string(), error };
         let files = Profile::names_files(&text).map_err(named)?;
         let folder = origin.parent().unwrap_or(Path::new("."));
@@ -60,7 +61,9 @@ impl Source {
             let path = folder.join(&name);
             let found = match bundled::file(&name) {
                 Some(text) if !path.exists() => text.to_string(),
-                _ => foreign_text_of(&path).map_err(|problem| unreadable(&path, problem))?,
+                // Another program wrote it, in whatever encoding.
+                _ => (bytes_of(&path).and_then(|bytes| Ok(decoded(&bytes)?)))
+                    .map_err(|problem| unreadable(&path, problem))?,
             };
             read.push((name, found));
         }
@@ -140,8 +143,8 @@ impl Library {
         let entries = self.folders.iter().filter_map(|folder| std::fs::read_dir(folder).ok()).flatten();
         let id = |entry: std::fs::DirEntry| {
             let path = entry.path();
-            let toml = path.extension().is_some_and(|end| end == "toml");
-            toml.then(|| path.file_stem().map(|stem| stem.to_string_lossy().into_owned())).flatten()
+            path.extension().filter(|end| *end == "toml")?;
+            path.file_stem().map(|stem| stem.to_string_lossy().into_owned())
         };
         let mut ids: Vec<String> = entries.filter_map(Result::ok).filter_map(id).collect();
         ids.sort();
@@ -157,16 +160,7 @@ impl Library {
     }
 }
 
-/// Text of an ordinary file of a sensible size.
-fn text_of(path: &Path) -> Result<String, FileError> {
-    Ok(String::from_utf8(bytes_of(path)?)?)
-}
-
-/// Text that another program wrote, in whatever encoding.
-fn foreign_text_of(path: &Path) -> Result<String, FileError> {
-    Ok(decoded(&bytes_of(path)?)?)
-}
-
+/// What an ordinary file of a sensible size holds.
 fn bytes_of(path: &Path) -> Result<Vec<u8>, FileError> {
     if !std::fs::metadata(path)?.is_file() {
         return Err(FileError::NotOrdinary);

@@ -20,24 +20,15 @@ pub enum Trouble {
     Ended(Ended),
 }
 
-/// Registers at the other end of a wire.
+/// Registers at the other end of a wire. What may go wrong with them: [`Trouble`].
 pub trait Registers {
     /// Reads registers, as bytes in the order of the wire.
-    ///
-    /// # Errors
-    /// See [`Trouble`].
     fn read(&mut self, table: Table, address: u16, count: u16) -> Result<Vec<u8>, Trouble>;
 
     /// Writes neighbouring registers of a table that can be written.
-    ///
-    /// # Errors
-    /// See [`Trouble`].
     fn write(&mut self, table: Table, address: u16, registers: &[u16]) -> Result<(), Trouble>;
 
     /// A function of the maker's own with its byte; only over RTU.
-    ///
-    /// # Errors
-    /// See [`Trouble`].
     fn own_function(&mut self, function: u8, _data: u8) -> Result<(), Trouble> {
         Err(Trouble::Refused(format!("function {function:#04x} goes over RTU only")))
     }
@@ -77,6 +68,16 @@ impl Blocks {
         let blocks = &profile.description.write;
         touched.into_iter().map(|index| (blocks[index].clone(), words(&self.0[index]))).collect()
     }
+
+    /// Puts one set-point in, and gives its own registers with their table and the first of their addresses:
+    /// its block also holds set-points that nobody requested.
+    pub fn put_one(&mut self, profile: &Profile, set: SetId, value: f64) -> Option<(Table, u16, Vec<u16>)> {
+        let (block, mut words) = self.put(profile, &[(set, value)]).pop()?;
+        let described = &profile.description.set[set.0];
+        let count = described.number.map_or(1, |number| number.bytes().div_ceil(2));
+        let own = words.drain(..).skip(usize::from(described.register)).take(count).collect();
+        Some((block.table, block.address + described.register, own))
+    }
 }
 
 impl Conversation {
@@ -113,12 +114,10 @@ impl Conversation {
     ) -> Result<Infallible, Ended> {
         session.tell(Ok(()));
         let now = session.now();
-        let mut reads: Vec<(Periodic, FrameId, Poll)> = polls(session)
-            .into_iter()
-            .filter_map(|(frame, poll)| {
-                poll.rate_hz.map(|rate| (Periodic::new(rate_hz.unwrap_or(rate), now), frame, poll))
-            })
-            .collect();
+        let often = |(frame, poll): (FrameId, Poll)| {
+            poll.rate_hz.map(|rate| (Periodic::new(rate_hz.unwrap_or(rate), now), frame, poll))
+        };
+        let mut reads: Vec<_> = polls(session).into_iter().filter_map(often).collect();
         // All blocks at the rate of the fastest: one command is in all of them.
         let blocks = session.endpoint.profile().description.write.iter();
         let rates = blocks.map(|block| block.rate_hz.unwrap_or(100.0));
@@ -207,13 +206,8 @@ impl Conversation {
         wire: &mut dyn Registers,
         (set, value): (SetId, f64),
     ) -> Result<(), Trouble> {
-        let profile = session.endpoint.profile();
-        let Some((block, words)) = self.blocks.put(profile, &[(set, value)]).pop() else { return Ok(()) };
-        let described = &profile.description.set[set.0];
-        let first = usize::from(described.register);
-        let registers = described.number.map_or(1, |number| number.bytes().div_ceil(2));
-        let own = words.get(first..first + registers).unwrap_or(&words);
-        wire.write(block.table, block.address + described.register, own)
+        let own = self.blocks.put_one(session.endpoint.profile(), set, value);
+        own.map_or(Ok(()), |(table, address, own)| wire.write(table, address, &own))
     }
 
     /// Tells 'the instrument refused' from 'we could not talk'. A few bad answers are borne.
@@ -308,12 +302,8 @@ impl OffWay for Way<'_> {
     }
 
     fn read_state(&mut self, session: &mut Session) -> Result<(), Ended> {
-        for (frame, poll) in polls(session) {
-            if poll.rate_hz.is_some() {
-                self.conversation.read(session, self.wire, frame, &poll)?;
-            }
-        }
-        Ok(())
+        let mut regular = polls(session).into_iter().filter(|(_, poll)| poll.rate_hz.is_some());
+        regular.try_for_each(|(frame, poll)| self.conversation.read(session, self.wire, frame, &poll))
     }
 }
 

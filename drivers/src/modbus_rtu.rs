@@ -12,7 +12,6 @@ use super::serial::{Line, SharedLine};
 use super::session::Session;
 use super::setup::InstrumentSetup;
 use instruments::codec::modbus_rtu::{self as rtu, Request, RtuError};
-use instruments::profile::read_function;
 use instruments::schema::{Stream, Table};
 use std::convert::Infallible;
 use std::thread::JoinHandle;
@@ -22,21 +21,17 @@ use std::time::{Duration, Instant};
 const STOP_TRIES: u32 = 10;
 
 /// Starts the thread of one instrument.
-///
-/// # Errors
-/// Where no thread can be had.
-pub fn spawn(instrument: &InstrumentSetup, session: Session) -> Result<JoinHandle<Closed>, Ended> {
+pub(crate) fn spawn(instrument: &InstrumentSetup, session: Session) -> Result<JoinHandle<Closed>, Ended> {
     let link = session.endpoint.profile().description.link.clone();
     let path = instrument.address.strip_prefix("rtu:").unwrap_or(&instrument.address).to_string();
     let rate_hz = instrument.rate_hz;
     let unit = instrument.unit.or(link.unit).unwrap_or(1);
     let baud = instrument.baud.or(link.baud).unwrap_or(19_200);
-    let format = link.format.clone().unwrap_or_else(|| "8N1".into());
     if let Some(late) = super::serial::latency_timer_ms(&path).filter(|&ms| ms > 2) {
         tracing::warn!(path, "the adapter holds bytes back for up to {late} ms; set its latency_timer to 1");
     }
     session.spawn(move |session| {
-        let mut wire = Rtu::open(&path, baud, &format, unit, link.response_timeout_ms)?;
+        let mut wire = Rtu::open(&path, baud, link.line_format(), unit, link.response_timeout_ms)?;
         let health = session.endpoint.health();
         health.count(&health.connections);
         let stream = session.endpoint.profile().description.stream.clone();
@@ -48,7 +43,7 @@ pub fn spawn(instrument: &InstrumentSetup, session: Session) -> Result<JoinHandl
             wire.send_unanswered_off(session)?;
         }
         // Whatever an earlier connection was still owed comes now or never.
-        let longest = Duration::from_millis(u64::from(link.response_timeout_ms));
+        let longest = link.patience();
         wire.line.with(|line| line.drain(longest, 10 * longest))?;
         let conversation = Conversation::begin(session, &mut wire)?;
         match stream {
@@ -59,11 +54,8 @@ pub fn spawn(instrument: &InstrumentSetup, session: Session) -> Result<JoinHandl
 }
 
 fn write_request(unit: u8, table: Table, address: u16, registers: &[u16]) -> Request {
-    if table.is_bits() {
-        rtu::write_coils(unit, address, registers)
-    } else {
-        rtu::write(unit, address, registers)
-    }
+    let write = if table.is_bits() { rtu::write_coils } else { rtu::write };
+    write(unit, address, registers)
 }
 
 /// A unit on a line.
@@ -205,7 +197,7 @@ impl Rtu {
 
 impl Registers for Rtu {
     fn read(&mut self, table: Table, address: u16, count: u16) -> Result<Vec<u8>, Trouble> {
-        let request = rtu::read(self.unit, read_function(table), address, count);
+        let request = rtu::read(self.unit, table.read_function(), address, count);
         let answer = self.ask(&request)?;
         self.judged(rtu::registers(&request, &answer))
     }

@@ -25,10 +25,7 @@ use tokio_modbus::prelude::Slave;
 const LOOK_EVERY: Duration = Duration::from_millis(10);
 
 /// Starts the thread of one instrument.
-///
-/// # Errors
-/// Where the address makes no sense or no thread can be had.
-pub fn spawn(instrument: &InstrumentSetup, session: Session) -> Result<JoinHandle<Closed>, Ended> {
+pub(crate) fn spawn(instrument: &InstrumentSetup, session: Session) -> Result<JoinHandle<Closed>, Ended> {
     let link = &session.endpoint.profile().description.link;
     let address = resolve(&instrument.address, link.port)?;
     let unit = instrument.unit.or(link.unit).unwrap_or(255);
@@ -160,17 +157,13 @@ fn part<T>(answer: Result<tokio_modbus::Result<T>, Ended>) -> Result<T, Trouble>
 
 impl Registers for Tcp<'_> {
     fn read(&mut self, table: Table, address: u16, count: u16) -> Result<Vec<u8>, Trouble> {
-        let (runtime, limit) = (self.runtime, self.answer_ms);
+        let (runtime, limit, wire) = (self.runtime, self.answer_ms, &mut self.context);
         let bits = |bits: Vec<bool>| bits.into_iter().map(u16::from).collect();
         let registers: Vec<u16> = match table {
-            Table::Holding => {
-                part(within(runtime, limit, self.context.read_holding_registers(address, count)))?
-            }
-            Table::Input => part(within(runtime, limit, self.context.read_input_registers(address, count)))?,
-            Table::Coil => bits(part(within(runtime, limit, self.context.read_coils(address, count)))?),
-            Table::Discrete => {
-                bits(part(within(runtime, limit, self.context.read_discrete_inputs(address, count)))?)
-            }
+            Table::Holding => part(within(runtime, limit, wire.read_holding_registers(address, count)))?,
+            Table::Input => part(within(runtime, limit, wire.read_input_registers(address, count)))?,
+            Table::Coil => bits(part(within(runtime, limit, wire.read_coils(address, count)))?),
+            Table::Discrete => bits(part(within(runtime, limit, wire.read_discrete_inputs(address, count)))?),
         };
         Ok(registers.iter().flat_map(|register| register.to_be_bytes()).collect())
     }

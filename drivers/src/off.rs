@@ -15,21 +15,15 @@ pub const OFF_ANSWER_MS: u32 = 600;
 /// Pause between two tries.
 const AGAIN: Duration = Duration::from_millis(4);
 
-/// What a transport can do for an 'off'.
+/// What a transport can do for an 'off'. It fails only where the connection carries nothing more.
 pub trait OffWay {
     /// Sends every safe set-point, whatever became of the one before. What was refused it tells the endpoint.
-    ///
-    /// # Errors
-    /// Only where the connection carries nothing more.
     fn send_off(&mut self, session: &mut Session) -> Result<(), Ended>;
 
     /// From now on answers are waited for as long as [`OFF_ANSWER_MS`], where the profile allows less.
     fn be_patient(&mut self, session: &Session);
 
     /// Gets the next state of the instrument into the endpoint.
-    ///
-    /// # Errors
-    /// Only where the connection carries nothing more.
     fn read_state(&mut self, session: &mut Session) -> Result<(), Ended>;
 }
 

@@ -105,9 +105,8 @@ pub fn registers(
         Place::Tcp(host) => {
             let address = resolve(host, Some(502))?;
             let runtime = tokio::runtime::Builder::new_current_thread().enable_all().build()?;
-            let clock = Instant::now().into();
-            Tcp::connect((&runtime, &clock), address, unit, PATIENCE_MS, PATIENCE_MS)?
-                .read(table, first, count)?
+            let with = (&runtime, &Instant::now().into());
+            Tcp::connect(with, address, unit, PATIENCE_MS, PATIENCE_MS)?.read(table, first, count)?
         }
         Place::Serial(path) => {
             Rtu::open(path, speed.baud, &speed.format, unit, PATIENCE_MS)?.read(table, first, count)?

@@ -16,61 +16,39 @@ use ringbuf::{HeapCons, HeapProd, HeapRb};
 /// Samples that wait for the loop at most: a quarter of a second at 1 kHz.
 const SAMPLES: usize = 256;
 
-/// What the loop wants of the amplifier, as the link's thread takes it.
+/// What the loop wants of an amplifier, a stage or a supply's switch, as the link's thread takes it.
 #[derive(Debug, Clone, Copy, PartialEq)]
-pub struct DriveSetPoint {
-    /// Peak-to-peak amplitude in m.
-    pub amplitude_pp_m: f64,
-    /// Frequency in Hz.
-    pub frequency_hz: f64,
-    /// Output on.
-    pub enable: bool,
-    /// Count of commands, and heartbeat.
-    pub sequence: u32,
+pub struct SetPoint {
+    /// Set-points by the names that profiles use for them, in SI units; amplitudes are peak-to-peak. No
+    /// profile has one without a name.
+    pub values: [(&'static str, f64); 3],
+    /// Whether it drives, moves, loads or closes.
+    pub on: bool,
+    /// Count of commands, and heartbeat; none for a supply's switch.
+    pub sequence: Option<u32>,
     /// It must not leave after this.
     pub expires_at: Nanos,
 }
 
-impl From<DriveCommand> for DriveSetPoint {
+impl From<DriveCommand> for SetPoint {
     fn from(command: DriveCommand) -> Self {
+        let on = command.enable();
+        let (amplitude_pp_m, frequency_hz) = (command.amplitude().metres(), command.frequency_hz());
         Self {
-            amplitude_pp_m: command.amplitude().metres(),
-            frequency_hz: command.frequency_hz(),
-            enable: command.enable(),
-            sequence: command.sequence(),
+            values: [("amplitude", amplitude_pp_m), ("frequency", frequency_hz), ("enable", f64::from(on))],
+            on,
+            sequence: Some(command.sequence()),
             expires_at: command.expires_at(),
         }
     }
 }
 
-/// What the loop wants of the stage, as the link's thread takes it.
-#[derive(Debug, Clone, Copy, PartialEq)]
-pub struct StageSetPoint {
-    /// Velocity along the stroke in m/s.
-    pub velocity_m_s: f64,
-    /// Normal load in N.
-    pub normal_force_n: f64,
-    /// Count of commands, and heartbeat.
-    pub sequence: u32,
-    /// It must not leave after this.
-    pub expires_at: Nanos,
-}
-
-impl StageSetPoint {
-    /// Whether it neither moves nor loads.
-    pub fn rests(&self) -> bool {
-        self.velocity_m_s == 0.0 && self.normal_force_n == 0.0
-    }
-}
-
-impl From<StageCommand> for StageSetPoint {
-    fn from(command: StageCommand) -> Self {
-        Self {
-            velocity_m_s: command.velocity_m_s(),
-            normal_force_n: command.normal_force_n(),
-            sequence: command.sequence(),
-            expires_at: command.expires_at(),
-        }
+impl SetPoint {
+    /// What the loop wants of the stage: velocity along the stroke in m/s, normal load in N.
+    pub(crate) fn of_stage(velocity_m_s: f64, load_n: f64, sequence: u32, expires_at: Nanos) -> Self {
+        let on = !(velocity_m_s == 0.0 && load_n == 0.0);
+        let values = [("velocity", velocity_m_s), ("load", load_n), ("enable", f64::from(on))];
+        Self { values, on, sequence: Some(sequence), expires_at }
     }
 }
 
@@ -111,15 +89,19 @@ impl SafetyInputs for ContactsPort {
     }
 }
 
-/// Two force instruments with one axis each. They sample on their own: each axis has its own age.
-struct Pair {
-    lateral: ForcePort,
-    normal: ForcePort,
-}
+/// Force instruments as one port, each axis from the first that gives it (lateral, normal). They sample on
+/// their own: each axis has its own age.
+pub struct Merged(pub Vec<(ForcePort, (bool, bool))>);
 
-impl ForceSensor for Pair {
+impl ForceSensor for Merged {
     fn read(&mut self, now: Nanos) -> Forces {
-        Forces { lateral: self.lateral.read(now).lateral, normal: self.normal.read(now).normal }
+        let mut forces = Forces::missing(NoData::NotFitted);
+        for (port, (lateral, normal)) in self.0.iter_mut().rev() {
+            let read = port.read(now);
+            forces.lateral = if *lateral { read.lateral } else { forces.lateral };
+            forces.normal = if *normal { read.normal } else { forces.normal };
+        }
+        forces
     }
 }
 
@@ -127,62 +109,47 @@ impl ForceSensor for Pair {
 ///
 /// # Errors
 /// Where an axis is given by no instrument or by two.
-pub fn compose(mut ports: Vec<(ForcePort, (bool, bool))>) -> Result<Box<dyn ForceSensor>, SetupError> {
-    let axes: Vec<(bool, bool)> = ports.iter().map(|(_, axes)| *axes).collect();
-    match axes.as_slice() {
-        [(true, true)] => Ok(Box::new(ports.remove(0).0)),
-        [(true, false), (false, true)] => {
-            let normal = ports.remove(1).0;
-            Ok(Box::new(Pair { lateral: ports.remove(0).0, normal }))
-        }
-        [(false, true), (true, false)] => {
-            let lateral = ports.remove(1).0;
-            Ok(Box::new(Pair { lateral, normal: ports.remove(0).0 }))
-        }
-        _ => Err(SetupError::Axes),
-    }
+pub fn compose(ports: Vec<(ForcePort, (bool, bool))>) -> Result<Box<dyn ForceSensor>, SetupError> {
+    let given = |axis: fn(&(bool, bool)) -> bool| ports.iter().filter(|(_, axes)| axis(axes)).count();
+    let once = given(|axes| axes.0) == 1 && given(|axes| axes.1) == 1;
+    if once { Ok(Box::new(Merged(ports))) } else { Err(SetupError::Axes) }
 }
 
-/// The loop's side of an instrument with states of type `S` that takes set-points of type `C`.
-pub struct Port<S, C> {
+/// The loop's side of an instrument with states of type `S` that takes set-points.
+pub struct Port<S> {
     states: HeapCons<Result<S, NoData>>,
-    commands: Mailbox<C>,
+    commands: Mailbox<SetPoint>,
     last: Result<S, NoData>,
 }
 
-/// The ends that the link of such an instrument holds.
-pub struct Link<S, C> {
-    /// Into the loop.
-    pub states: HeapProd<Result<S, NoData>>,
-    /// Out of the loop.
-    pub commands: Mailbox<C>,
-}
+/// The states of an instrument on their way to the loop.
+pub type States<S> = HeapProd<Result<S, NoData>>;
 
 /// The amplifier's port.
-pub type AmplifierPort = Port<AmplifierState, DriveSetPoint>;
+pub type AmplifierPort = Port<AmplifierState>;
 /// The stage's port.
-pub type StagePort = Port<StageState, StageSetPoint>;
+pub type StagePort = Port<StageState>;
 /// The port of the switch in the amplifier's supply.
-pub type SupplyPort = Port<SupplyState, SupplySetPoint>;
+pub type SupplyPort = Port<SupplyState>;
 
-/// A port, and the ends that the link holds.
-pub fn port<S, C>() -> (Link<S, C>, Port<S, C>) {
+/// The ends that the link holds, into the loop and out of it, and the port.
+pub fn port<S>() -> (States<S>, Mailbox<SetPoint>, Port<S>) {
     let (into_loop, states) = HeapRb::new(SAMPLES).split();
     let commands = Mailbox::default();
-    let link = Link { states: into_loop, commands: commands.clone() };
-    (link, Port { states, commands, last: Err(NoData::NeverRead) })
+    (into_loop, commands.clone(), Port { states, commands, last: Err(NoData::NeverRead) })
 }
 
-impl AmplifierPort {
+impl<S> Port<S> {
     /// Hands a set-point to the link.
-    pub(crate) fn push(&mut self, set_point: DriveSetPoint) {
-        self.commands.put(set_point, !set_point.enable);
+    pub(crate) fn push(&mut self, set_point: impl Into<SetPoint>) {
+        let set_point = set_point.into();
+        self.commands.put(set_point, !set_point.on);
     }
 }
 
 impl Amplifier for AmplifierPort {
     fn command(&mut self, command: DriveCommand, _now: Nanos) {
-        self.push(command.into());
+        self.push(command);
     }
 
     fn state(&mut self, _now: Nanos) -> Result<AmplifierState, NoData> {
@@ -192,8 +159,8 @@ impl Amplifier for AmplifierPort {
 
 impl Stage for StagePort {
     fn command(&mut self, command: StageCommand, _now: Nanos) {
-        let set_point = StageSetPoint::from(command);
-        self.commands.put(set_point, set_point.rests());
+        let (velocity_m_s, load_n) = (command.velocity_m_s(), command.normal_force_n());
+        self.push(SetPoint::of_stage(velocity_m_s, load_n, command.sequence(), command.expires_at()));
     }
 
     fn state(&mut self, _now: Nanos) -> Result<StageState, NoData> {
@@ -204,19 +171,11 @@ impl Stage for StagePort {
 /// The supply opens when the loop has been silent for this time: a dead loop closes no supply.
 const SUPPLY_EXPIRES: Nanos = Nanos(250_000_000);
 
-/// The loop's set-point of the supply, as the link's thread takes it.
-#[derive(Debug, Clone, Copy, PartialEq)]
-pub struct SupplySetPoint {
-    /// Closed; else open.
-    pub closed: bool,
-    /// It must not leave after this.
-    pub expires_at: Nanos,
-}
-
 impl SupplySwitch for SupplyPort {
     fn command(&mut self, command: SupplyCommand, now: Nanos) {
-        let closed = command == SupplyCommand::Restore;
-        self.commands.put(SupplySetPoint { closed, expires_at: now.plus(SUPPLY_EXPIRES) }, !closed);
+        let on = command == SupplyCommand::Restore;
+        let values = [("closed", f64::from(on)), ("", 0.0), ("", 0.0)];
+        self.push(SetPoint { values, on, sequence: None, expires_at: now.plus(SUPPLY_EXPIRES) });
     }
 
     fn state(&mut self, _now: Nanos) -> Result<SupplyState, NoData> {

@@ -112,11 +112,8 @@ impl SharedLine {
         let whole = |open: &Arc<Open>| open.key == key && !open.gone.load(Ordering::Acquire);
         if let Some(open) = all.iter().filter_map(Weak::upgrade).find(whole) {
             let (baud, format) = &open.settings;
-            return if open.settings == settings {
-                Ok(Self(open))
-            } else {
-                Err(Ended::Io(format!("{path} is open for another unit at {baud} baud, {format}")))
-            };
+            let other = format!("{path} is open for another unit at {baud} baud, {format}");
+            return if open.settings == settings { Ok(Self(open)) } else { Err(Ended::Io(other)) };
         }
         let line = Mutex::new(Line::open(path, baud, format)?);
         let open = Arc::new(Open { key, settings, line, gone: AtomicBool::new(false) });
@@ -149,24 +146,13 @@ fn came(read: std::io::Result<usize>) -> Result<Option<usize>, Ended> {
 }
 
 fn parse_format(format: &str) -> Option<(DataBits, Parity, StopBits)> {
-    let bytes = format.as_bytes();
-    let data = match bytes.first()? {
-        b'7' => DataBits::Seven,
-        b'8' => DataBits::Eight,
-        _ => return None,
-    };
-    let parity = match bytes.get(1)? {
-        b'N' => Parity::None,
-        b'E' => Parity::Even,
-        b'O' => Parity::Odd,
-        _ => return None,
-    };
-    let stop = match bytes.get(2)? {
-        b'1' => StopBits::One,
-        b'2' => StopBits::Two,
-        _ => return None,
-    };
-    (bytes.len() == 3).then_some((data, parity, stop))
+    fn meant<T: Copy>(all: &[(u8, T)], letter: u8) -> Option<T> {
+        all.iter().find(|(known, _)| *known == letter).map(|(_, meant)| *meant)
+    }
+    let [data, parity, stop] = *format.as_bytes() else { return None };
+    let data = meant(&[(b'7', DataBits::Seven), (b'8', DataBits::Eight)], data)?;
+    let parity = meant(&[(b'N', Parity::None), (b'E', Parity::Even), (b'O', Parity::Odd)], parity)?;
+    Some((data, parity, meant(&[(b'1', StopBits::One), (b'2', StopBits::Two)], stop)?))
 }
 
 /// The latency timer of a USB serial adapter in ms, where the port is such a one: at FTDI's default

@@ -3,7 +3,7 @@
 use super::ended::Ended;
 use super::serial::Line;
 use instruments::bus::{CanEvent, CanPort};
-use instruments::codec::can::{CanFrame, SlcanMessage, SlcanReader, slcan_line, slcan_speed};
+use instruments::codec::can::{CanFrame, SlcanReader, slcan_line, slcan_speed};
 use std::collections::VecDeque;
 use std::io;
 use std::time::{Duration, Instant};
@@ -32,10 +32,13 @@ impl Slcan {
     }
 }
 
+fn failed(ended: Ended) -> io::Error {
+    io::Error::other(ended.to_string())
+}
+
 impl CanPort for Slcan {
     fn send(&mut self, frame: &CanFrame) -> io::Result<bool> {
-        self.line.write(&slcan_line(frame)).map_err(|ended| io::Error::other(ended.to_string()))?;
-        Ok(true)
+        self.line.write(&slcan_line(frame)).map(|()| true).map_err(failed)
     }
 
     fn receive(&mut self, deadline: Instant) -> io::Result<Option<CanEvent>> {
@@ -44,17 +47,11 @@ impl CanPort for Slcan {
                 return Ok(Some(CanEvent::Frame(frame, Duration::ZERO)));
             }
             let mut buffer = [0; 512];
-            let count =
-                self.line.read(&mut buffer, deadline).map_err(|ended| io::Error::other(ended.to_string()))?;
+            let count = self.line.read(&mut buffer, deadline).map_err(failed)?;
             if count == 0 {
                 return Ok(None);
             }
-            let waiting = &mut self.waiting;
-            self.reader.push(&buffer[..count], |message| {
-                if let SlcanMessage::Frame(frame) = message {
-                    waiting.push_back(frame);
-                }
-            });
+            self.reader.push(&buffer[..count], |frame| self.waiting.push_back(frame));
         }
     }
 }

@@ -89,21 +89,17 @@ fn sent(written: io::Result<()>) -> io::Result<bool> {
 fn judge(error: &CanError) -> CanEvent {
     use socketcan::errors::{ControllerProblems, ErrorCause};
     let passive = ControllerProblems::RX_PASSIVE | ControllerProblems::TX_PASSIVE;
-    let well = ControllerProblems::ACTIVE;
-    let (mut off, mut is_passive, mut warns) = (false, false, false);
-    for cause in error.causes() {
-        match cause {
-            ErrorCause::BusOff => off = true,
-            ErrorCause::Controller(problems) if problems.intersects(passive) => is_passive = true,
-            ErrorCause::Controller(problems) if *problems != well => warns = true,
-            _ => {}
-        }
-    }
-    match (off, is_passive, warns) {
-        (true, ..) => CanEvent::BusOff,
-        (_, true, _) => CanEvent::Passive,
-        (_, _, true) => CanEvent::Warning,
-        _ => CanEvent::Other,
+    let controller = |is: &dyn Fn(ControllerProblems) -> bool| {
+        error.causes().any(|cause| matches!(cause, ErrorCause::Controller(problems) if is(*problems)))
+    };
+    if error.causes().any(|cause| matches!(cause, ErrorCause::BusOff)) {
+        CanEvent::BusOff
+    } else if controller(&|problems| problems.intersects(passive)) {
+        CanEvent::Passive
+    } else if controller(&|problems| problems != ControllerProblems::ACTIVE) {
+        CanEvent::Warning
+    } else {
+        CanEvent::Other
     }
 }
 

@@ -10,6 +10,15 @@ use std::time::{Duration, Instant};
 /// The longest line that an instrument may send.
 const LONGEST_LINE: usize = 4096;
 
+/// Takes the first whole line out of what came; returns it without its end.
+pub(crate) fn first_line(came: &mut Vec<u8>, end: &[u8]) -> Result<Option<Vec<u8>>, Ended> {
+    match came.windows(end.len()).position(|window| window == end) {
+        Some(at) => Ok(Some(came.drain(..at + end.len()).take(at).collect())),
+        None if came.len() > LONGEST_LINE => Err(Ended::Corrupt("a line without an end".into())),
+        None => Ok(None),
+    }
+}
+
 /// Bytes on their way to frames.
 enum Framing {
     /// Frames of one length that end with a check.
@@ -22,18 +31,12 @@ enum Framing {
 
 impl Framing {
     fn of(session: &Session, stream: &Stream, parted: bool) -> Self {
-        let end = || session.endpoint.profile().description.link.rx_terminator.clone();
+        let link = &session.endpoint.profile().description.link;
         match (stream.shape(), stream.length) {
             (Some(shape), _) => Self::Binary(Cutter::new(shape)),
-            (None, Some(length)) => {
-                Self::Datagrams { sync: stream.sync.clone(), length: usize::from(length) }
-            }
+            (None, Some(length)) => Self::Datagrams { sync: stream.sync.clone(), length: length.into() },
             // What comes before the first end is half a line; a datagram is whole.
-            (None, None) => Self::Lines {
-                end: end().unwrap_or_else(|| "\n".into()).into_bytes(),
-                came: Vec::new(),
-                believed: parted,
-            },
+            (None, None) => Self::Lines { end: link.rx_end().into(), came: Vec::new(), believed: parted },
         }
     }
 }
@@ -90,8 +93,7 @@ pub fn listen(
                 if parted && count > 0 && !came.ends_with(end) {
                     came.extend_from_slice(end);
                 }
-                while let Some(at) = came.windows(end.len()).position(|window| window == end.as_slice()) {
-                    let line: Vec<u8> = came.drain(..at + end.len()).take(at).collect();
+                while let Some(line) = first_line(came, end)? {
                     let whole = std::mem::replace(believed, true);
                     let text = String::from_utf8_lossy(&line);
                     match shape.read_line(&text) {
@@ -102,9 +104,6 @@ pub fn listen(
                         }
                         _ => {}
                     }
-                }
-                if came.len() > LONGEST_LINE {
-                    return Err(Ended::Corrupt("a line without an end".into()));
                 }
             }
         }

@@ -11,6 +11,7 @@ use super::off::{self, OFF_ANSWER_MS, OffWay};
 use super::remedy;
 use super::session::{Periodic, Session};
 use super::setup::InstrumentSetup;
+use super::stream::first_line;
 use super::transport::{Address, Transport};
 use instruments::codec::pattern::Pattern;
 use instruments::codec::text::number;
@@ -25,18 +26,13 @@ use std::time::{Duration, Instant};
 
 /// An unchanged set-point is sent again after this long.
 const REPEAT: Duration = Duration::from_secs(1);
-/// The longest line that an instrument may send.
-const LONGEST_LINE: usize = 4096;
 /// Silence that must follow a binary answer.
 const AFTER_A_BLOCK: Duration = Duration::from_micros(1500);
 /// How often commands are looked for.
 const COMMAND_RATE_HZ: f64 = 500.0;
 
 /// Starts the thread of one instrument.
-///
-/// # Errors
-/// Where the address makes no sense or no thread can be had.
-pub fn spawn(instrument: &InstrumentSetup, session: Session) -> Result<JoinHandle<Closed>, Ended> {
+pub(crate) fn spawn(instrument: &InstrumentSetup, session: Session) -> Result<JoinHandle<Closed>, Ended> {
     let link = session.endpoint.profile().description.link.clone();
     let at = Address::of(&instrument.address, &link, instrument.baud)?;
     let rate_hz = instrument.rate_hz;
@@ -125,8 +121,7 @@ impl Talk {
     fn send(&mut self, line: &str) -> Result<(), Ended> {
         let gap = Duration::from_secs_f64(self.link.min_gap_ms.max(0.0) * 1e-3);
         std::thread::sleep(gap.saturating_sub(self.requested_at.elapsed()));
-        let end = self.link.tx_terminator.clone().unwrap_or_else(|| "\n".into());
-        self.transport.write(format!("{line}{end}").as_bytes())?;
+        self.transport.write(format!("{line}{}", self.link.tx_end()).as_bytes())?;
         self.requested_at = Instant::now();
         line.clone_into(&mut self.request);
         Ok(())
@@ -134,9 +129,8 @@ impl Talk {
 
     /// Takes whole lines that came unasked out of what came. Returns whether one was an alarm.
     fn unasked(&mut self, session: &mut Session) {
-        let end = self.link.rx_terminator.clone().unwrap_or_else(|| "\n".into());
         for alarm in &self.alarms {
-            while let Some((at, length)) = alarm.find(&self.came, end.as_bytes()) {
+            while let Some((at, length)) = alarm.find(&self.came, self.link.rx_end().as_bytes()) {
                 let line: Vec<u8> = self.came.drain(at..at + length).collect();
                 session.endpoint.alarm(String::from_utf8_lossy(&line).trim());
             }
@@ -172,16 +166,12 @@ impl Talk {
 
     /// The next line, without its end, that is no unsolicited one.
     fn line(&mut self, session: &mut Session) -> Result<String, Ended> {
-        let end = self.link.rx_terminator.clone().unwrap_or_else(|| "\n".into()).into_bytes();
+        let end = self.link.rx_end().to_owned().into_bytes();
         let deadline = Instant::now() + self.limit();
         loop {
             self.unasked(session);
-            if let Some(at) = self.came.windows(end.len()).position(|window| window == end) {
-                let line: Vec<u8> = self.came.drain(..at + end.len()).take(at).collect();
+            if let Some(line) = first_line(&mut self.came, &end)? {
                 return Ok(String::from_utf8_lossy(&line).trim().to_string());
-            }
-            if self.came.len() > LONGEST_LINE {
-                return Err(Ended::Corrupt("a line without an end".into()));
             }
             if !self.take(deadline)? && Instant::now() >= deadline {
                 return Err(match self.came.is_empty() {
@@ -273,10 +263,10 @@ impl Talk {
     fn go_on(mut self, session: &mut Session, rate_hz: Option<f64>) -> Result<Infallible, Ended> {
         session.tell(Ok(()));
         let now = session.now();
-        let mut asks: Vec<(Periodic, FrameId, Query)> = queries(session)
-            .into_iter()
-            .map(|(frame, query)| (Periodic::new(rate_hz.unwrap_or(query.rate_hz), now), frame, query))
-            .collect();
+        let often = |(frame, query): (FrameId, Query)| {
+            (Periodic::new(rate_hz.unwrap_or(query.rate_hz), now), frame, query)
+        };
+        let mut asks: Vec<_> = queries(session).into_iter().map(often).collect();
         let mut commands = Periodic::new(COMMAND_RATE_HZ, now);
         loop {
             if session.stopping() {
@@ -306,24 +296,20 @@ impl Talk {
         self.clear(session)?;
         self.send(&query.send)?;
         let bytes = match query.length {
-            Some(length) => match self.block(session, usize::from(length))? {
-                Some(block) => block,
-                None => {
-                    return self
-                        .bear(session, format!("`{}` was answered by more than {length} bytes", query.send));
-                }
-            },
+            Some(length) => {
+                let block = self.block(session, usize::from(length))?;
+                block.ok_or_else(|| format!("more than {length} bytes"))
+            }
             None => {
                 let line = self.line(session)?;
-                match session.endpoint.profile().frames()[frame.0].read_line(&line) {
-                    Some(numbers) => numbers,
-                    None => {
-                        let echo = if line == query.send { ": switch the instrument's echo off" } else { "" };
-                        return self
-                            .bear(session, format!("`{}` was answered by `{line}`{echo}", query.send));
-                    }
-                }
+                let echo = if line == query.send { ": switch the instrument's echo off" } else { "" };
+                let numbers = session.endpoint.profile().frames()[frame.0].read_line(&line);
+                numbers.ok_or_else(|| format!("`{line}`{echo}"))
             }
+        };
+        let bytes = match bytes {
+            Ok(bytes) => bytes,
+            Err(by) => return self.bear(session, format!("`{}` was answered by {by}", query.send)),
         };
         self.bad = 0;
         let arrived = session.now();

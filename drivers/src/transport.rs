@@ -37,8 +37,8 @@ impl Address {
             (Some(host), _) => Ok(Self::Tcp(resolve(host, link.port)?)),
             (None, _) if network => Ok(Self::Tcp(resolve(address, link.port)?)),
             (None, _) => {
-                let format = link.format.clone().unwrap_or_else(|| "8N1".into());
-                Ok(Self::Serial(address.into(), baud.or(link.baud).unwrap_or(9600), format))
+                let baud = baud.or(link.baud).unwrap_or(9600);
+                Ok(Self::Serial(address.into(), baud, link.line_format().into()))
             }
         }
     }
@@ -103,8 +103,7 @@ impl Transport {
                 if came.is_empty() {
                     std::thread::sleep(left);
                 }
-                let count = came.len().min(buffer.len());
-                buffer[..count].copy_from_slice(&came[..count]);
+                let count = (&came[..]).read(buffer)?;
                 came.drain(..count);
                 Ok(count)
             }
@@ -162,12 +161,9 @@ impl Transport {
             }
             Transport::Udp(socket, instrument, port) => {
                 trace::sent(port, bytes);
-                let sent = if socket.peer_addr().is_ok() {
-                    socket.send(bytes)
-                } else {
-                    socket.send_to(bytes, *instrument)
-                };
-                sent.map(drop).map_err(Ended::from)
+                let connected = socket.peer_addr().is_ok();
+                if connected { socket.send(bytes) } else { socket.send_to(bytes, *instrument) }?;
+                Ok(())
             }
         }
     }

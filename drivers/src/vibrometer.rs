@@ -6,6 +6,7 @@
 
 use super::library::Source;
 use super::serial::Line;
+use super::stream::first_line;
 use super::{Ended, OpenError};
 use calibration::amplitude::vibrometer::Decoder;
 use instruments::codec::text::quantity;
@@ -122,12 +123,11 @@ pub fn settings(setup: &VibrometerSetup) -> Result<Settings, OpenError> {
     };
     let (id, address) = (&setup.profile, &setup.address);
     let failed = |problem| OpenError::Beside { id: id.clone(), address: address.clone(), problem };
-    let format = link.format.clone().unwrap_or_else(|| "8N1".into());
-    let line =
-        Line::open(&setup.address, setup.baud.or(link.baud).unwrap_or(115_200), &format).map_err(failed)?;
+    let baud = setup.baud.or(link.baud).unwrap_or(115_200);
+    let line = Line::open(&setup.address, baud, link.line_format()).map_err(failed)?;
     let mut talk = Talk { line, link, came: Vec::new() };
     // Ends a line that an earlier program left incomplete.
-    talk.line.write(talk.end(true).as_bytes()).map_err(failed)?;
+    talk.line.write(talk.link.tx_end().as_bytes()).map_err(failed)?;
     talk.line.drain(Duration::from_millis(100), Duration::from_secs(1)).map_err(failed)?;
     let mut decoders = Vec::new();
     for number in 0..choice.most {
@@ -183,27 +183,19 @@ struct Talk {
 }
 
 impl Talk {
-    fn end(&self, sent: bool) -> String {
-        let end = if sent { &self.link.tx_terminator } else { &self.link.rx_terminator };
-        end.clone().unwrap_or_else(|| "\n".into())
-    }
-
     /// One question and its answer, a line.
     fn ask(&mut self, question: &str) -> Result<String, Ended> {
-        let (sent, came) = (self.end(true), self.end(false).into_bytes());
+        let came = self.link.rx_end().as_bytes();
         self.came.clear();
-        self.line.write(format!("{question}{sent}").as_bytes())?;
-        let deadline = Instant::now() + Duration::from_millis(u64::from(self.link.response_timeout_ms));
+        self.line.write(format!("{question}{}", self.link.tx_end()).as_bytes())?;
+        let deadline = Instant::now() + self.link.patience();
         loop {
-            if let Some(at) = self.came.windows(came.len()).position(|window| window == came) {
-                let answer = String::from_utf8_lossy(&self.came[..at]).trim().to_string();
+            if let Some(line) = first_line(&mut self.came, came)? {
+                let answer = String::from_utf8_lossy(&line).trim().to_string();
                 if answer == question {
                     return Err(Ended::Refused("it echoes what it is sent: switch its Echo off".into()));
                 }
                 return Ok(answer);
-            }
-            if self.came.len() > 4096 {
-                return Err(Ended::Corrupt("a line without an end".into()));
             }
             let mut buffer = [0; 256];
             let count = self.line.read(&mut buffer, deadline)?;
@@ -211,7 +203,7 @@ impl Talk {
             if count == 0 && Instant::now() >= deadline {
                 return Err(match self.came.is_empty() {
                     true => Ended::Timeout(self.link.response_timeout_ms),
-                    false => Ended::Cut(super::remedy::unended(&self.came, &came, question)),
+                    false => Ended::Cut(super::remedy::unended(&self.came, came, question)),
                 });
             }
         }

@@ -19,17 +19,11 @@ pub enum CanEvent {
     BusOff,
 }
 
-/// A CAN bus, whatever stands behind it.
+/// A CAN bus, whatever stands behind it. It fails only where the bus is gone.
 pub trait CanPort: Send {
     /// Sends a frame; `false` where there is no room for it now (back-pressure), and then it is not sent.
-    ///
-    /// # Errors
-    /// Where the bus is gone.
     fn send(&mut self, frame: &CanFrame) -> io::Result<bool>;
 
     /// The next event until `deadline`; `None` where none came.
-    ///
-    /// # Errors
-    /// Where the bus is gone.
     fn receive(&mut self, deadline: Instant) -> io::Result<Option<CanEvent>>;
 }

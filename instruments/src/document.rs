@@ -1,7 +1,7 @@
 //! A profile as a page for people, generated so that it cannot drift from what the drivers do.
 
-use crate::profile::{Frame, FrameKind};
-use crate::schema::{Description, Init, Link, LinkKind, Severity, Stamp, Table, Verified};
+use crate::profile::{Frame, FrameKind, Span};
+use crate::schema::{Description, Init, Link, LinkKind, Severity, Stamp, Verified};
 use crate::{Profile, SignalId};
 use std::fmt::Write;
 
@@ -105,9 +105,8 @@ fn link(link: &Link) -> String {
     let end = |end: &Option<String>| end.as_ref().map(|end| code(&end.escape_default().to_string()));
     add("lines sent end with", end(&link.tx_terminator));
     add("lines that come end with", end(&link.rx_terminator));
-    let alarms =
-        (!link.unsolicited.is_empty()).then(|| link.unsolicited.iter().map(|a| code(a)).collect::<Vec<_>>());
-    add("alarms", alarms.map(|alarms| alarms.join(" ")));
+    let alarms: Vec<String> = link.unsolicited.iter().map(|alarm| code(alarm)).collect();
+    add("alarms", (!alarms.is_empty()).then(|| alarms.join(" ")));
     add("an answer must be complete within", Some(format!("{} ms", link.response_timeout_ms)));
     parts.join("; ")
 }
@@ -116,13 +115,13 @@ fn frame_row(d: &Description, frame: &Frame) -> Vec<String> {
     let (is, rate) = match &frame.kind {
         FrameKind::Poll(index) => {
             let poll = &d.poll[*index];
-            let spans = frame.spans.iter().map(|s| match s.count {
+            let span = |s: &Span| match s.count {
                 1 => s.address.to_string(),
                 _ => format!("{} to {}", s.address, s.end() - 1),
-            });
-            let spans: Vec<String> = spans.collect();
+            };
+            let spans: Vec<String> = frame.spans.iter().map(span).collect();
             let word = if frame.bytes == 2 { "register" } else { "registers" };
-            (format!("{} {word} {}", table_name(poll.table), spans.join(", ")), poll.rate_hz)
+            (format!("{} {word} {}", spaced(&poll.table), spans.join(", ")), poll.rate_hz)
         }
         FrameKind::Stream => {
             let stream = d.stream.as_ref();
@@ -140,36 +139,23 @@ fn frame_row(d: &Description, frame: &Frame) -> Vec<String> {
         }
         FrameKind::Query(index) => {
             let query = &d.query[*index];
-            let answer = query
-                .answer
-                .as_deref()
-                .map_or(String::new(), |answer| format!(" answered by {}", code(answer)));
+            let answered = |answer: &String| format!(" answered by {}", code(answer));
+            let answer = query.answer.as_ref().map_or(String::new(), answered);
             (format!("{}{answer}", code(&query.send)), Some(query.rate_hz))
         }
     };
     vec![frame.name.clone(), is, frame.bytes.to_string(), rate.map_or("once".into(), |rate| rate.to_string())]
 }
 
-fn table_name(table: Table) -> &'static str {
-    match table {
-        Table::Holding => "holding",
-        Table::Input => "input",
-        Table::Coil => "coil",
-        Table::Discrete => "discrete",
-    }
-}
-
 fn init_row(init: &Init) -> Vec<String> {
     let registers = |(first, values): &(u16, Vec<u16>)| {
-        format!("{} registers from {first}: {values:?}", table_name(init.table))
+        format!("{} registers from {first}: {values:?}", spaced(&init.table))
     };
     let action = None
         .or_else(|| init.send.as_deref().map(code))
         .or_else(|| init.hex.as_ref().map(|hex| format!("bytes {hex}")))
         .or_else(|| init.registers.as_ref().map(registers))
-        .or_else(|| {
-            init.copy.map(|(from, to, count)| format!("{count} registers from {from} copied to {to}"))
-        })
+        .or_else(|| init.copy.map(|(from, to, n)| format!("{n} registers from {from} copied to {to}")))
         .or_else(|| init.function.map(|(function, data)| format!("function {function:#04x} with {data}")))
         .or_else(|| init.can.as_ref().map(|(id, data)| format!("message {id:#x}: {data:02x?}")))
         .or_else(|| init.sdo.map(|(index, sub, _, value)| format!("object {index:04X}sub{sub}: {value}")));
@@ -224,7 +210,7 @@ fn set_row(d: &Description, set: &crate::schema::Set) -> Vec<String> {
         match (set.object, named) {
             (Some((index, sub)), _) => format!("object {index:04X}sub{sub}"),
             (None, Some(write)) => {
-                format!("{} register {}", table_name(write.table), write.address + set.register)
+                format!("{} register {}", spaced(&write.table), write.address + set.register)
             }
             (None, None) => String::new(),
         }

@@ -28,11 +28,6 @@ impl ProfileError {
         self.help = help.into();
         self
     }
-
-    /// From the TOML reader.
-    pub(crate) fn from_toml(text: &str, error: &toml::de::Error) -> Self {
-        Self::at(text, error.span(), error.message())
-    }
 }
 
 impl std::fmt::Display for ProfileError {

@@ -6,54 +6,37 @@
 //! read; evaluation allocates nothing.
 
 /// A compiled expression; names became indices of signals.
-#[derive(Debug, Clone, PartialEq)]
+#[derive(Debug, Clone)]
 pub struct Expression(Node);
 
-#[derive(Debug, Clone, PartialEq)]
+type Unary = fn(f64) -> f64;
+type Binary = fn(f64, f64) -> f64;
+
+#[derive(Debug, Clone)]
 enum Node {
     Number(f64),
     Signal(usize),
-    Not(Box<Node>),
-    Negate(Box<Node>),
-    PowerOfTen(Box<Node>),
-    Binary(Operator, Box<Node>, Box<Node>),
-}
-
-#[derive(Debug, Clone, Copy, PartialEq)]
-enum Operator {
-    Or,
-    And,
-    Equal,
-    NotEqual,
-    LessEqual,
-    GreaterEqual,
-    Less,
-    Greater,
-    BitOr,
-    BitAnd,
-    Add,
-    Subtract,
-    Multiply,
-    Divide,
+    Unary(Unary, Box<Node>),
+    Binary(Binary, Box<Node>, Box<Node>),
 }
 
 /// Operators by how tightly they bind, the loosest first; longer spellings before their prefixes.
 /// Unlike C, `&` binds tighter than `==`, so `status & 0x4F == 8` means what it looks like.
-const LEVELS: [&[(&str, Operator)]; 7] = [
-    &[("||", Operator::Or)],
-    &[("&&", Operator::And)],
+const LEVELS: [&[(&str, Binary)]; 7] = [
+    &[("||", |a, b| truth(a != 0.0 || b != 0.0))],
+    &[("&&", |a, b| truth(a != 0.0 && b != 0.0))],
     &[
-        ("==", Operator::Equal),
-        ("!=", Operator::NotEqual),
-        ("<=", Operator::LessEqual),
-        (">=", Operator::GreaterEqual),
-        ("<", Operator::Less),
-        (">", Operator::Greater),
+        ("==", |a, b| truth(a == b)),
+        ("!=", |a, b| truth(a != b)),
+        ("<=", |a, b| truth(a <= b)),
+        (">=", |a, b| truth(a >= b)),
+        ("<", |a, b| truth(a < b)),
+        (">", |a, b| truth(a > b)),
     ],
-    &[("|", Operator::BitOr)],
-    &[("&", Operator::BitAnd)],
-    &[("+", Operator::Add), ("-", Operator::Subtract)],
-    &[("*", Operator::Multiply), ("/", Operator::Divide)],
+    &[("|", |a, b| bits(a, b, |a, b| a | b))],
+    &[("&", |a, b| bits(a, b, |a, b| a & b))],
+    &[("+", |a, b| a + b), ("-", |a, b| a - b)],
+    &[("*", |a, b| a * b), ("/", |a, b| a / b)],
 ];
 
 /// Brackets and signs deeper than this are refused, so that a hostile file cannot exhaust the stack.
@@ -108,33 +91,16 @@ impl Expression {
 
 // raw counts and bits are whole numbers, exactly
 fn evaluate(node: &Node, signals: &[f64]) -> f64 {
-    let truth = |yes: bool| f64::from(u8::from(yes));
     match node {
         Node::Number(number) => *number,
         Node::Signal(index) => signals.get(*index).copied().unwrap_or(f64::NAN),
-        Node::Not(inner) => truth(evaluate(inner, signals) == 0.0),
-        Node::Negate(inner) => -evaluate(inner, signals),
-        Node::PowerOfTen(inner) => 10_f64.powf(evaluate(inner, signals)),
-        Node::Binary(operator, left, right) => {
-            let (a, b) = (evaluate(left, signals), evaluate(right, signals));
-            match operator {
-                Operator::Or => truth(a != 0.0 || b != 0.0),
-                Operator::And => truth(a != 0.0 && b != 0.0),
-                Operator::Equal => truth(a == b),
-                Operator::NotEqual => truth(a != b),
-                Operator::LessEqual => truth(a <= b),
-                Operator::GreaterEqual => truth(a >= b),
-                Operator::Less => truth(a < b),
-                Operator::Greater => truth(a > b),
-                Operator::BitOr => bits(a, b, |a, b| a | b),
-                Operator::BitAnd => bits(a, b, |a, b| a & b),
-                Operator::Add => a + b,
-                Operator::Subtract => a - b,
-                Operator::Multiply => a * b,
-                Operator::Divide => a / b,
-            }
-        }
+        Node::Unary(of, inner) => of(evaluate(inner, signals)),
+        Node::Binary(of, left, right) => of(evaluate(left, signals), evaluate(right, signals)),
     }
+}
+
+fn truth(yes: bool) -> f64 {
+    f64::from(yes)
 }
 
 // status words have at most 32 bits
@@ -191,9 +157,9 @@ impl Parser<'_> {
         }
         self.skip_space();
         let node = if !self.rest().starts_with("!=") && self.take("!") {
-            Node::Not(Box::new(self.unary()?))
+            Node::Unary(|x| truth(x == 0.0), Box::new(self.unary()?))
         } else if self.take("-") {
-            Node::Negate(Box::new(self.unary()?))
+            Node::Unary(|x| -x, Box::new(self.unary()?))
         } else {
             self.atom()?
         };
@@ -238,7 +204,7 @@ impl Parser<'_> {
             self.demand("(", after("`(`", "`pow10`"))?;
             let inner = self.level(0)?;
             self.demand(")", after("`)`", "`pow10(`"))?;
-            return Ok(Node::PowerOfTen(Box::new(inner)));
+            return Ok(Node::Unary(|x| 10_f64.powf(x), Box::new(inner)));
         }
         (self.index)(word).map(Node::Signal).ok_or_else(|| ExpressionError::UnknownSignal(word.into()))
     }

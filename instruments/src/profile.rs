@@ -149,12 +149,8 @@ impl Profile {
     }
 
     /// The same for a profile that names other files: `file` gives the text of each.
-    ///
-    /// # Errors
-    /// What is wrong, with the place in the file.
     pub fn parse_with(text: &str, file: &dyn Fn(&str) -> Option<String>) -> Result<Self, ProfileError> {
-        let mut description: Description =
-            toml::from_str(text).map_err(|error| ProfileError::from_toml(text, &error))?;
+        let mut description = described(text)?;
         description.signal = computed::spread(description.signal);
         Compiler { text, description: &description, file }.compile()
     }
@@ -164,9 +160,8 @@ impl Profile {
     /// # Errors
     /// Where the text is not a profile, with the place.
     pub fn names_files(text: &str) -> Result<Vec<String>, ProfileError> {
-        let description: Description =
-            toml::from_str(text).map_err(|error| ProfileError::from_toml(text, &error))?;
-        Ok(description.link.dbc.into_iter().chain(description.link.eds).collect())
+        let link = described(text)?.link;
+        Ok(link.dbc.into_iter().chain(link.eds).collect())
     }
 
     /// The name that setups use.
@@ -207,11 +202,8 @@ impl Profile {
 
     /// Names and indices of all signals, in the file's order.
     pub fn signals(&self) -> impl Iterator<Item = (&str, SignalId)> {
-        self.description
-            .signal
-            .iter()
-            .enumerate()
-            .map(|(i, signal)| (signal.name.as_ref().as_str(), SignalId(i)))
+        let signals = self.description.signal.iter().enumerate();
+        signals.map(|(i, signal)| (signal.name.as_ref().as_str(), SignalId(i)))
     }
 
     /// Values of all signals, none decoded yet.
@@ -368,6 +360,10 @@ impl Profile {
     }
 }
 
+fn described(text: &str) -> Result<Description, ProfileError> {
+    toml::from_str(text).map_err(|error| ProfileError::at(text, error.span(), error.message()))
+}
+
 /// Why a decoded value does not count.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum Refusal {
@@ -377,14 +373,4 @@ pub enum Refusal {
     MarkedInvalid,
     /// At or beyond the end of the stated range.
     OutOfRange,
-}
-
-/// The function code that reads a table.
-pub const fn read_function(table: crate::schema::Table) -> u8 {
-    match table {
-        crate::schema::Table::Holding => 3,
-        crate::schema::Table::Input => 4,
-        crate::schema::Table::Coil => 1,
-        crate::schema::Table::Discrete => 2,
-    }
 }

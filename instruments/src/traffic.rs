@@ -41,7 +41,7 @@ impl Profile {
     pub fn line_share(&self, setup: LineSetup) -> Option<f64> {
         let d = &self.description;
         let serial = |default: u32| f64::from(setup.baud.or(d.link.baud).unwrap_or(default));
-        let byte_s = |baud: f64| bits_a_byte(d.link.format.as_deref().unwrap_or("8N1")) / baud;
+        let byte_s = |baud: f64| bits_a_byte(d.link.line_format()) / baud;
         let share: f64 = match d.link.kind {
             LinkKind::ModbusTcp if !setup.over_rtu => return None,
             LinkKind::Scpi | LinkKind::Tcp | LinkKind::Udp | LinkKind::Sysfs => return None,
@@ -63,8 +63,7 @@ impl Profile {
             }
             LinkKind::Serial => {
                 let baud = serial(9600);
-                let ends = |end: &Option<String>| end.as_ref().map_or(1, String::len);
-                let (sent, came) = (ends(&d.link.tx_terminator), ends(&d.link.rx_terminator));
+                let (sent, came) = (d.link.tx_end().len(), d.link.rx_end().len());
                 let queries = d.query.iter().map(|query| {
                     let line = query.answer.as_deref().and_then(|answer| Pattern::parse(answer).ok());
                     let least = line.map_or(1, |line| line.least_length());
@@ -80,12 +79,9 @@ impl Profile {
                 let groups = self.frames().iter().filter_map(|frame| {
                     let FrameKind::Messages(index, parts) = &frame.kind else { return None };
                     let message = &d.message[*index];
-                    let request = message
-                        .request
-                        .as_ref()
-                        .map_or(0.0, |data| can_overhead(false) + 8.0 * data.len() as f64);
-                    let answer: f64 =
-                        parts.iter().map(|part| can_overhead(part.extended) + 8.0 * part.length as f64).sum();
+                    let bits = |extended, bytes: usize| can_overhead(extended) + 8.0 * bytes as f64;
+                    let request = message.request.as_ref().map_or(0.0, |data| bits(false, data.len()));
+                    let answer: f64 = parts.iter().map(|part| bits(part.extended, part.length)).sum();
                     Some(setup.rate_hz.unwrap_or(message.rate_hz) * (request + answer))
                 });
                 groups.sum::<f64>() / bitrate
@@ -98,9 +94,8 @@ impl Profile {
         let d = &self.description;
         d.stream.as_ref().map_or(0.0, |stream| {
             let line = stream.line.as_deref().and_then(|line| Pattern::parse(line).ok());
-            let end = d.link.rx_terminator.as_ref().map_or(1, String::len);
-            let bytes =
-                line.map_or(usize::from(stream.length.unwrap_or(0)), |line| line.least_length() + end);
+            let whole = |line: Pattern| line.least_length() + d.link.rx_end().len();
+            let bytes = line.map_or(usize::from(stream.length.unwrap_or(0)), whole);
             stream.rate_hz * bytes as f64
         })
     }

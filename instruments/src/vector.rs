@@ -28,9 +28,8 @@ impl Profile {
         let blocks = d.write.iter().map(|block| block.name.as_ref());
         for (name, seen) in self.frames().iter().map(|frame| &frame.name).chain(blocks).zip(seen) {
             if !seen {
-                let place = text.find(&format!("\"{name}\"")).map(|at| at..at + name.len() + 2);
-                let place =
-                    place.or_else(|| text.find(&format!("[{name}]")).map(|at| at..at + name.len() + 2));
+                let place = text.find(&format!("\"{name}\"")).or_else(|| text.find(&format!("[{name}]")));
+                let place = place.map(|at| at..at + name.len() + 2);
                 let error = ProfileError::at(text, place, format!("`{name}` has no golden vector"));
                 return Err(error.with_help("add a [[vector]] for it"));
             }
@@ -42,8 +41,7 @@ impl Profile {
     fn check_vector(&self, vector: &Vector, text: &str) -> Result<usize, ProfileError> {
         let d = &self.description;
         let polls = self.frames().len();
-        let place = || Some(vector.expect.span());
-        let error = |message: String| ProfileError::at(text, place(), message);
+        let error = |message: String| ProfileError::at(text, Some(vector.expect.span()), message);
         let names: Vec<&String> =
             self.frames().iter().map(|f| &f.name).chain(d.write.iter().map(|w| w.name.as_ref())).collect();
         let which = match &vector.frame {
@@ -78,11 +76,8 @@ impl Profile {
             self.decode(FrameId(which), &bytes, &mut values).map_err(|e| error(e.to_string()))?;
             self.misfit(which, &bytes).map_or(Ok(()), |misfit| Err(error(misfit)))?;
         } else if bytes.len() != 2 * usize::from(d.write[which - polls].count) {
-            return Err(error(format!(
-                "the block has {} registers, the vector {} bytes",
-                d.write[which - polls].count,
-                bytes.len()
-            )));
+            let (registers, bytes) = (d.write[which - polls].count, bytes.len());
+            return Err(error(format!("the block has {registers} registers, the vector {bytes} bytes")));
         }
         for (name, &expected) in vector.expect.as_ref() {
             let found = if which < polls {
@@ -99,9 +94,8 @@ impl Profile {
             let tolerance = if single { TOLERANCE_SINGLE } else { TOLERANCE };
             let close = (found - expected).abs() <= tolerance * expected.abs().max(1.0);
             if !close {
-                return Err(error(format!(
-                    "the vector says {name} = {expected}; its bytes decode to {found}"
-                )));
+                let found = format!("the vector says {name} = {expected}; its bytes decode to {found}");
+                return Err(error(found));
             }
         }
         self.check_encoding(which, &bytes, &values).map_err(error)?;
@@ -139,11 +133,8 @@ impl Profile {
                 self.encode_set(set, value, &mut again).map_err(|e| e.to_string())?;
             }
         }
-        if again == bytes {
-            Ok(())
-        } else {
-            Err(format!("encoding the values again gives {again:02x?}, not {bytes:02x?}"))
-        }
+        let other = || format!("encoding the values again gives {again:02x?}, not {bytes:02x?}");
+        if again == bytes { Ok(()) } else { Err(other()) }
     }
 }
 

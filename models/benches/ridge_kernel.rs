@@ -58,7 +58,7 @@ impl Ridge {
             corneum.retardation_time_s = 1e-6;
         }
         let soft = |young| Material::elastic(young, 0.33, 750.0);
-        let built = RidgeGeometry::TABLE_1.mesh(corneum, soft(1.5e6), soft(0.02e6), elements);
+        let built = RidgeGeometry::TABLE_1.mesh([corneum, soft(1.5e6), soft(0.02e6)], elements);
         let mesh = built.expect("Table 1").mesh;
         let mut body = Body::new(mesh.clone(), strain);
         body.hold_top();

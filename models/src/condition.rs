@@ -97,18 +97,13 @@ impl Condition {
     /// # Errors
     /// Amplitude or speed negative, frequency, normal force or `mu_0` not positive, or anything not finite.
     pub fn check(&self) -> Result<(), OutOfDomain> {
-        let at_least_zero = [("amplitude_pp_m", self.amplitude.metres()), ("speed_m_s", self.speed_m_s)];
-        let positive =
-            [("frequency_hz", self.frequency_hz), ("normal_force_n", self.normal_force_n), ("mu0", self.mu0)];
-        for (name, value) in at_least_zero {
-            if !(value.is_finite() && value >= 0.0) {
-                return Err(OutOfDomain { name, value, needed: "a finite number, zero or more" });
-            }
+        let (at_least_zero, positive) = ("a finite number, zero or more", "a finite number above zero");
+        for (name, value) in [("amplitude_pp_m", self.amplitude.metres()), ("speed_m_s", self.speed_m_s)] {
+            OutOfDomain::unless(value.is_finite() && value >= 0.0, name, value, at_least_zero)?;
         }
-        for (name, value) in positive {
-            if !(value.is_finite() && value > 0.0) {
-                return Err(OutOfDomain { name, value, needed: "a finite number above zero" });
-            }
+        let (frequency, load) = (self.frequency_hz, self.normal_force_n);
+        for (name, value) in [("frequency_hz", frequency), ("normal_force_n", load), ("mu0", self.mu0)] {
+            OutOfDomain::unless(value.is_finite() && value > 0.0, name, value, positive)?;
         }
         Ok(())
     }
@@ -135,4 +130,14 @@ pub struct OutOfDomain {
     pub value: f64,
     /// What would be accepted.
     pub needed: &'static str,
+}
+
+impl OutOfDomain {
+    /// The value itself as an error, unless it is accepted.
+    ///
+    /// # Errors
+    /// Where it is not.
+    pub fn unless(accepted: bool, name: &'static str, value: f64, needed: &'static str) -> Result<(), Self> {
+        if accepted { Ok(()) } else { Err(OutOfDomain { name, value, needed }) }
+    }
 }

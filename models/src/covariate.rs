@@ -66,6 +66,11 @@ impl Covariate {
         (self.get)(condition)
     }
 
+    /// Its value at each of some conditions; `None` where it was not measured at all of them.
+    pub fn of_all(&self, conditions: &[Condition]) -> Option<Vec<f64>> {
+        conditions.iter().map(self.get).collect()
+    }
+
     /// Gives a condition this value.
     pub fn put(&self, condition: &mut Condition, value: f64) {
         (self.set)(condition, value);

@@ -48,26 +48,19 @@ impl Finger {
     /// # Errors
     /// Stiffnesses or recovery speed not positive, Poisson's ratio outside (-1, 0.5), negative uncertainty.
     pub fn check(&self) -> Result<(), OutOfDomain> {
-        let refuse = |name, value, needed| Err(OutOfDomain { name, value, needed });
+        let unless = OutOfDomain::unless;
         for (name, value) in [
             ("normal_stiffness_n_per_m", self.normal_stiffness_n_per_m),
             ("lateral_stiffness_n_per_m", self.lateral_stiffness_n_per_m),
         ] {
-            if !(value.is_finite() && value > 0.0) {
-                return refuse(name, value, "a finite number above zero");
-            }
+            unless(value.is_finite() && value > 0.0, name, value, "a finite number above zero")?;
         }
-        if !(self.poisson_ratio > -1.0 && self.poisson_ratio < 0.5) {
-            return refuse("poisson_ratio", self.poisson_ratio, "a number between -1 and 0.5");
-        }
-        if !(self.stiffness_relative_sd.is_finite() && self.stiffness_relative_sd >= 0.0) {
-            return refuse("stiffness_relative_sd", self.stiffness_relative_sd, "zero or more");
-        }
-        match self.lateral_recovery_m_per_s {
-            Some(v) if v.is_nan() || v <= 0.0 => {
-                refuse("lateral_recovery_m_per_s", v, "a number above zero (leave it out for infinite)")
-            }
-            _ => Ok(()),
-        }
+        let nu = self.poisson_ratio;
+        unless(nu > -1.0 && nu < 0.5, "poisson_ratio", nu, "a number between -1 and 0.5")?;
+        let sd = self.stiffness_relative_sd;
+        unless(sd.is_finite() && sd >= 0.0, "stiffness_relative_sd", sd, "zero or more")?;
+        let speed = self.lateral_recovery_m_per_s.unwrap_or(f64::INFINITY);
+        let needed = "a number above zero (leave it out for infinite)";
+        unless(speed > 0.0, "lateral_recovery_m_per_s", speed, needed)
     }
 }

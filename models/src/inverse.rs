@@ -49,10 +49,8 @@ pub fn amplitude_for(
     mu_relative: f64,
     largest: PeakToPeak,
 ) -> Result<AmplitudeAnswer, NoAmplitude> {
-    if !(mu_relative > 0.0 && mu_relative <= 1.0) {
-        let needed = "a number above 0 and at most 1";
-        return Err(OutOfDomain { name: "mu_relative", value: mu_relative, needed }.into());
-    }
+    let possible = mu_relative > 0.0 && mu_relative <= 1.0;
+    OutOfDomain::unless(possible, "mu_relative", mu_relative, "a number above 0 and at most 1")?;
     let at = |w: f64| law.predict(&Condition { amplitude: PeakToPeak::from_metres(w), ..*condition });
     let crossing = |target: f64| -> Result<Option<f64>, OutOfDomain> {
         if at(0.0)?.mu_relative <= target {

@@ -46,12 +46,11 @@ impl BuiltIn {
     /// A finger outside the domain of the law, by name.
     pub fn law(self, finger: &Finger) -> Result<Arc<dyn FrictionModel>, OutOfDomain> {
         finger.check()?;
+        let table = || Surrogate::shipped().expect("the shipped table reads, as a test proves");
         Ok(match self {
             BuiltIn::SpringSlider => Arc::new(SpringSlider::new(*finger)?),
             BuiltIn::Psi => Arc::new(EmpiricalPsi::paper(*finger)?),
-            BuiltIn::Surrogate => Arc::new(
-                Surrogate::shipped().expect("the shipped table reads, as a test proves").for_finger(finger),
-            ),
+            BuiltIn::Surrogate => Arc::new(table().for_finger(finger)),
         })
     }
 }

@@ -294,9 +294,8 @@ impl LawTable {
             let value = axis.variable.of(condition);
             let (low, high) = (axis.nodes[0], axis.nodes[axis.nodes.len() - 1]);
             let slack = ROUNDING * (high - low);
-            if !(value >= low - slack && value <= high + slack) {
-                return Err(OutOfDomain { name: axis.variable.name, value, needed: INSIDE });
-            }
+            let inside = value >= low - slack && value <= high + slack;
+            OutOfDomain::unless(inside, axis.variable.name, value, INSIDE)?;
             let cell = axis.nodes.partition_point(|n| *n <= value).clamp(1, axis.nodes.len() - 1) - 1;
             *share = ((value - axis.nodes[cell]) / (axis.nodes[cell + 1] - axis.nodes[cell])).clamp(0.0, 1.0);
             first += cell * axis.stride;

@@ -104,13 +104,7 @@ impl Pass {
 /// `mu_0 = sum(direction L F) / sum(F^2)` over the passes without vibration; `None` without such passes.
 pub fn coulomb_coefficient(passes: &[Pass]) -> Option<f64> {
     let still = passes.iter().filter(|p| p.amplitude == PeakToPeak::ZERO);
-    let mut top = 0.0;
-    let mut bottom = 0.0;
-    for pass in still {
-        if let Some(friction) = pass.friction_force_n() {
-            top += friction * pass.normal_force_n;
-            bottom += pass.normal_force_n * pass.normal_force_n;
-        }
-    }
+    let forces = still.filter_map(|p| Some((p.friction_force_n()?, p.normal_force_n)));
+    let (top, bottom) = forces.fold((0.0, 0.0), |(top, bottom), (l, f)| (top + l * f, bottom + f * f));
     (bottom > 0.0).then(|| top / bottom)
 }

@@ -88,12 +88,6 @@ pub struct Fit {
     pub passes: u32,
 }
 
-impl From<Fit> for PsiStar {
-    fn from(fit: Fit) -> Self {
-        PsiStar { psi_star: fit.psi_star, low: fit.low, high: fit.high, conditions: fit.conditions }
-    }
-}
-
 /// What Eq. 20 says of a condition under a `Psi*`.
 struct Under {
     /// How much more force there is for less of `ln Psi*`, in N.
@@ -125,7 +119,8 @@ pub fn scale_sd(rig: &RigFile) -> f64 {
 /// `Psi*` of a run's passes, with the noise that its rig.toml states.
 pub fn of_run<'a>(passes: impl IntoIterator<Item = &'a Pass>, rig: &RigFile) -> Option<PsiStar> {
     let passes = passes.into_iter().filter_map(|p| Some((p.condition(1.0), p.friction_force_n()?)));
-    of_passes(passes, rig.finger.poisson_ratio, rig.noise, scale_sd(rig)).map(PsiStar::from)
+    let fit = of_passes(passes, rig.finger.poisson_ratio, rig.noise, scale_sd(rig))?;
+    Some(PsiStar { psi_star: fit.psi_star, low: fit.low, high: fit.high, conditions: fit.conditions })
 }
 
 /// `Psi*` of passes, in any order: each one's measured condition (whose `mu0` is ignored) and mean friction

@@ -70,4 +70,8 @@ impl RidgeError {
     fn input(what: impl Into<String>, value: f64, range: impl Into<String>) -> Self {
         Self::Input { what: what.into(), value, range: range.into() }
     }
+
+    fn unless(ok: bool, what: impl Into<String>, value: f64, range: impl Into<String>) -> Result<(), Self> {
+        if ok { Ok(()) } else { Err(Self::input(what, value, range)) }
+    }
 }

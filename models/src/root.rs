@@ -31,12 +31,9 @@ pub fn bracketed(mut f: impl FnMut(f64) -> f64, lo: f64, hi: f64) -> f64 {
         let towards = (middle - secant).signum();
         let truncated =
             if truncation <= (middle - secant).abs() { secant + towards * truncation } else { middle };
-        let radius = slack - 0.5 * width.abs();
-        let x = if (truncated - middle).abs() <= radius.max(0.0) {
-            truncated
-        } else {
-            middle - towards * radius.max(0.0)
-        };
+        let radius = (slack - 0.5 * width.abs()).max(0.0);
+        let near = (truncated - middle).abs() <= radius;
+        let x = if near { truncated } else { middle - towards * radius };
         let x = if x <= a.min(b) || x >= a.max(b) || !x.is_finite() { middle } else { x };
         let fx = f(x);
         if fx == 0.0 {
@@ -47,8 +44,7 @@ pub fn bracketed(mut f: impl FnMut(f64) -> f64, lo: f64, hi: f64) -> f64 {
         } else {
             (b, fb) = (x, fx);
         }
-        slack *= 0.5;
-        slack = slack.max(tolerance);
+        slack = (0.5 * slack).max(tolerance);
     }
     0.5 * (a + b)
 }
@@ -90,17 +86,12 @@ pub fn newton_between(
         if value == 0.0 {
             return x;
         }
-        if (value < 0.0) == rises {
-            low = x
-        } else {
-            high = x
-        }
+        (low, high) = if (value < 0.0) == rises { (x, high) } else { (low, x) };
         let step = value / slope;
         let to = x - step;
         let newton = to > low && to < high && 2.0 * step.abs() <= last.abs();
         let to = if newton { to } else { 0.5 * (low + high) };
-        last = to - x;
-        x = to;
+        (last, x) = (to - x, to);
         if last.abs() <= tolerance {
             break;
         }
@@ -135,15 +126,9 @@ pub fn newton_or_half(
     let mut x = start;
     for _ in 0..60 {
         let (above, to) = look(x);
-        if above {
-            high = x
-        } else {
-            low = x
-        }
-        let next = if to > low && to < high { to } else { 0.5 * (low + high) };
-        let found = (next - x).abs() < close(x);
-        x = next;
-        if found {
+        (low, high) = if above { (low, x) } else { (x, high) };
+        let before = std::mem::replace(&mut x, if to > low && to < high { to } else { 0.5 * (low + high) });
+        if (x - before).abs() < close(before) {
             break;
         }
     }
@@ -160,11 +145,7 @@ pub fn secant(mut f: impl FnMut(f64) -> f64, [mut low, mut high]: [f64; 2], star
         if gap.abs() < settled {
             break;
         }
-        if gap > 0.0 {
-            low = x
-        } else {
-            high = x
-        }
+        (low, high) = if gap > 0.0 { (x, high) } else { (low, x) };
         if high - low < settled {
             break;
         }

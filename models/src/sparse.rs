@@ -94,16 +94,12 @@ impl Sparse {
         if document.schema != "muprime.adaptive/1" {
             return Err(format!("schema '{}'; this version reads 'muprime.adaptive/1'", document.schema));
         }
-        let error = document
-            .rounds
-            .last()
-            .ok_or("no round has measured its error; run `muprime model adapt` again")?
-            .rms;
+        let last = document.rounds.last();
+        let error = last.ok_or("no round has measured its error; run `muprime model adapt` again")?.rms;
         let (count, dimensions) = (document.grid.nodes.len(), document.variables.len());
         if count == 0 || count > MOST_NODES {
-            return Err(format!(
-                "{count} nodes; 1 to {MOST_NODES} are read, as the loop waits for each (--nodes)"
-            ));
+            let why = "are read, as the loop waits for each (--nodes)";
+            return Err(format!("{count} nodes; 1 to {MOST_NODES} {why}"));
         }
         let place = |name: &str| VARIABLES[..OF_LAWS].iter().position(|v| v.name == name);
         let mut axes = Vec::new();
@@ -120,9 +116,8 @@ impl Sparse {
                     ));
                 }
                 _ => {
-                    return Err(format!(
-                        "no pass states '{name}'; fix it: `muprime model adapt --set {name}=VALUE`"
-                    ));
+                    let remedy = format!("fix it: `muprime model adapt --set {name}=VALUE`");
+                    return Err(format!("no pass states '{name}'; {remedy}"));
                 }
             };
             if !(span.low < span.high && (!span.log || span.low > 0.0)) {
@@ -154,10 +149,9 @@ impl Sparse {
     pub fn at(&self, condition: &Condition) -> Result<f64, OutOfDomain> {
         for (k, value) in &self.fixed {
             let found = VARIABLES[*k].of(condition);
-            if (found / value - 1.0).abs() > FIXED_WITHIN {
-                let needed = "a value within 5 % of the one at which the surrogate was made";
-                return Err(OutOfDomain { name: VARIABLES[*k].name, value: found, needed });
-            }
+            let needed = "a value within 5 % of the one at which the surrogate was made";
+            let far = (found / value - 1.0).abs() > FIXED_WITHIN;
+            OutOfDomain::unless(!far, VARIABLES[*k].name, found, needed)?;
         }
         let mut place = [0.0; OF_LAWS + 1];
         for ((source, span), place) in self.axes.iter().zip(&mut place) {
@@ -170,9 +164,8 @@ impl Sparse {
             } else {
                 (value - span.low) / (span.high - span.low)
             };
-            if !(-1e-9..=1.0 + 1e-9).contains(&share) {
-                return Err(OutOfDomain { name, value, needed: "a value that the surrogate spans" });
-            }
+            let spanned = (-1e-9..=1.0 + 1e-9).contains(&share);
+            OutOfDomain::unless(spanned, name, value, "a value that the surrogate spans")?;
             *place = share.clamp(0.0, 1.0);
         }
         let mut sum = 0.0;

@@ -105,65 +105,49 @@ pub struct Cycle {
 /// The dimensionless numbers that fix a cycle.
 #[derive(Clone, Copy, Debug, PartialEq)]
 struct Groups {
-    /// Half contact angle, pi in full contact.
-    alpha: f64,
-    /// Offset of the reaction force in units of `k_n a`: `-cos(alpha)`, or `h/a` in full contact.
-    offset: f64,
-    /// Growth of the stretch per radian.
-    kappa: f64,
-    /// Largest fall of the stretch per radian; infinite for instant recovery.
-    rho: f64,
+    stretch: Stretch,
     /// `h / a`.
     compression_ratio: f64,
 }
 
 impl Groups {
+    fn of(compression_ratio: f64, alpha: f64, kappa: f64, rho: f64) -> Self {
+        let always_touching = compression_ratio >= 1.0;
+        let offset = if always_touching { compression_ratio } else { -alpha.cos() };
+        Groups { stretch: Stretch { offset, alpha, always_touching, kappa, rho }, compression_ratio }
+    }
+
     fn at(c: &Condition, finger: &Finger) -> Self {
         let a = c.amplitude.sine_amplitude_m();
         let kn = finger.normal_stiffness_n_per_m;
         let compression_ratio = static_compression_m(c.normal_force_n, kn) / a;
         let alpha = half_contact_angle_rad(compression_ratio);
-        let offset = if compression_ratio >= 1.0 { compression_ratio } else { -alpha.cos() };
         let rate = finger.lateral_stiffness_n_per_m / (2.0 * PI * c.frequency_hz * c.mu0 * kn * a);
         let rho = finger.lateral_recovery_m_per_s.map_or(f64::INFINITY, |v| rate * v);
-        Groups { alpha, offset, kappa: rate * c.speed_m_s, rho, compression_ratio }
+        Groups::of(compression_ratio, alpha, rate * c.speed_m_s, rho)
     }
 
     /// The same with both stiffnesses multiplied. The contact angle depends on the normal one alone.
     fn with_stiffness_times(&self, normal: f64, lateral: f64) -> Self {
+        let Stretch { alpha: own, kappa, rho, .. } = self.stretch;
         let compression_ratio = self.compression_ratio / normal;
-        let (alpha, offset) = if normal == 1.0 {
-            (self.alpha, self.offset)
-        } else {
-            let alpha = if self.alpha < PI {
-                half_contact_angle_from(compression_ratio, self.alpha)
-            } else {
-                half_contact_angle_rad(compression_ratio)
-            };
-            (alpha, if compression_ratio >= 1.0 { compression_ratio } else { -alpha.cos() })
+        let alpha = match own {
+            alpha if normal == 1.0 => alpha,
+            alpha if alpha < PI => half_contact_angle_from(compression_ratio, alpha),
+            _ => half_contact_angle_rad(compression_ratio),
         };
         let rate = lateral / normal;
-        Groups { alpha, offset, kappa: self.kappa * rate, rho: self.rho * rate, compression_ratio }
+        Groups::of(compression_ratio, alpha, kappa * rate, rho * rate)
     }
 
     fn mu_relative(&self) -> f64 {
-        (self.stretch().steady().mean_force / self.compression_ratio).clamp(0.0, 1.0)
-    }
-
-    fn stretch(&self) -> Stretch {
-        Stretch {
-            offset: self.offset,
-            alpha: self.alpha,
-            always_touching: self.compression_ratio >= 1.0,
-            kappa: self.kappa,
-            rho: self.rho,
-        }
+        (self.stretch.steady().1.mean_force / self.compression_ratio).clamp(0.0, 1.0)
     }
 
     /// Whether the slider sticks at some instant of a cycle in the instant-recovery limit.
     fn sticks(&self) -> bool {
-        let steepest = if self.alpha >= PI / 2.0 { 1.0 } else { self.alpha.sin() };
-        self.kappa < steepest
+        let alpha = self.stretch.alpha;
+        self.stretch.kappa < if alpha >= PI / 2.0 { 1.0 } else { alpha.sin() }
     }
 }
 
@@ -190,10 +174,9 @@ pub(crate) fn solve_checked(c: &Condition, finger: &Finger) -> Cycle {
         return still(c);
     }
     let groups = Groups::at(c, finger);
-    let stretch = groups.stretch();
-    let steady = stretch.steady();
+    let (alpha, steady) = (groups.stretch.alpha, groups.stretch.steady().1);
     let mu_relative = (steady.mean_force / groups.compression_ratio).clamp(0.0, 1.0);
-    let full_contact = groups.compression_ratio >= 1.0;
+    let full_contact = groups.stretch.always_touching;
     let regime = if full_contact {
         Regime::FullContact
     } else if groups.sticks() {
@@ -201,21 +184,16 @@ pub(crate) fn solve_checked(c: &Condition, finger: &Finger) -> Cycle {
     } else {
         Regime::FullSlip
     };
-    let lead = PI + groups.alpha;
-    let slip_onset_s = match regime {
-        Regime::Intermittent => {
-            steady.slip_onset.map(|phi| (phi + groups.alpha) / (2.0 * PI * c.frequency_hz))
-        }
-        _ => None,
-    };
+    let sticks = regime == Regime::Intermittent;
+    let slip_onset = steady.slip_onset.filter(|_| sticks);
     Cycle {
         mu_relative,
         lateral_force_n: mu_relative * c.mu0 * c.normal_force_n,
         mean_reaction_force_n: c.normal_force_n,
-        contact_fraction: groups.alpha / PI,
-        slip_onset_s,
-        phase_shift_deg: if full_contact { 0.0 } else { lead.to_degrees() },
-        touch_down_deg: if full_contact { 0.0 } else { (PI - groups.alpha).to_degrees() },
+        contact_fraction: alpha / PI,
+        slip_onset_s: slip_onset.map(|phi| (phi + alpha) / (2.0 * PI * c.frequency_hz)),
+        phase_shift_deg: if full_contact { 0.0 } else { (PI + alpha).to_degrees() },
+        touch_down_deg: if full_contact { 0.0 } else { (PI - alpha).to_degrees() },
         regime,
         groups,
     }
@@ -246,13 +224,7 @@ fn still(c: &Condition) -> Cycle {
         phase_shift_deg: 0.0,
         touch_down_deg: 0.0,
         regime: Regime::FullContact,
-        groups: Groups {
-            alpha: PI,
-            offset: f64::INFINITY,
-            kappa: 0.0,
-            rho: f64::INFINITY,
-            compression_ratio: f64::INFINITY,
-        },
+        groups: Groups::of(f64::INFINITY, PI, 0.0, f64::INFINITY),
     }
 }
 
@@ -277,9 +249,8 @@ impl Cycle {
                 |i| Instant { time_over_period: at(i), reaction_over_normal: 1.0, lateral_over_coulomb: 1.0 };
             return (0..n).map(still).collect();
         }
-        let stretch = groups.stretch();
-        let start = stretch.steady().at_touch_down;
-        stretch.sample(start, n, |turn, reaction, lateral| Instant {
+        let (start, _) = groups.stretch.steady();
+        groups.stretch.sample(start, n, |turn, reaction, lateral| Instant {
             time_over_period: turn,
             reaction_over_normal: reaction / groups.compression_ratio,
             lateral_over_coulomb: lateral / groups.compression_ratio,
@@ -294,14 +265,12 @@ impl Cycle {
 pub fn transient(c: &Condition, finger: &Finger, cycles: usize) -> Result<Vec<f64>, OutOfDomain> {
     c.check()?;
     finger.check()?;
-    if c.amplitude.metres() == 0.0 {
-        return Err(OutOfDomain { name: "amplitude_pp_m", value: 0.0, needed: "a number above zero" });
-    }
+    let vibrates = c.amplitude.metres() != 0.0;
+    OutOfDomain::unless(vibrates, "amplitude_pp_m", 0.0, "a number above zero")?;
     let groups = Groups::at(c, finger);
-    let stretch = groups.stretch();
     let mut x = 0.0;
     let run = |_| {
-        let turn = stretch.turn(x);
+        let turn = groups.stretch.turn(x);
         x = turn.left_over;
         turn.mean_force / groups.compression_ratio
     };

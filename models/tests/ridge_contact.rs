@@ -109,7 +109,7 @@ fn hertz_pressure_under_the_tip() {
         (4.0 * load * radius / (std::f64::consts::PI * star)).sqrt(),
     );
     for elements in [1500, 4000] {
-        let built = geometry.mesh(material, material, material, elements).expect("valid");
+        let built = geometry.mesh([material; 3], elements).expect("valid");
         let (row, tip) = (built.corneum_rows, built.tip_spacing_m);
         let width = built.mesh.tributary_width_m(0);
         let base = built.mesh.tributary_width_m(row);

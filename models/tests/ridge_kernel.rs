@@ -299,7 +299,7 @@ fn bad_input_is_refused() {
     assert!(Mesh::block(-1.0, 1.0, 8, 8, good, false).is_err());
     assert!(Mesh::block(1.0, 1.0, 7, 8, good, false).is_err());
     let flat = RidgeGeometry { ridge_width_m: f64::NAN, ..RidgeGeometry::TABLE_1 };
-    assert!(flat.mesh(good, good, good, 1500).is_err());
-    assert!(RidgeGeometry::TABLE_1.mesh(good, good, good, 10).is_err());
+    assert!(flat.mesh([good; 3], 1500).is_err());
+    assert!(RidgeGeometry::TABLE_1.mesh([good; 3], 10).is_err());
     assert!(Plate::new(vec![1.0], muprime_models::ridge::FrictionRule::Local, f64::NAN).is_err());
 }

@@ -17,8 +17,7 @@ fn apart(a: &[f64], b: &[f64]) -> f64 {
 fn twin_in_c_agrees_to_rounding() {
     for strain in [Strain::Objective, Strain::Small] {
         let case = RidgeCase { elements: 300, strain, ..RidgeCase::paper() };
-        let [corneum, dermis, soft] = case.materials();
-        let built = case.geometry.mesh(corneum, dermis, soft, case.elements).expect("Table 1");
+        let built = case.geometry.mesh(case.materials(), case.elements).expect("Table 1");
         let mesh = built.mesh;
         let penalty = vec![93e6; mesh.nx];
         let share = vec![1.0 / mesh.nx as f64; mesh.nx];

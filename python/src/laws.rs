@@ -3,42 +3,43 @@
 use crate::MuprimeError;
 use models::condition::Condition;
 use models::finger::Finger;
-use models::prediction::{EmpiricalPsi, FrictionModel, SpringSlider, Validity};
+use models::law::BuiltIn;
+use models::prediction::{EmpiricalPsi, FrictionModel, Validity};
 use models::psi::{self, PsiEq17};
 use models::psi_fit;
 use models::quantity::PeakToPeak;
 use models::reading::Reading;
-use models::surrogate::Surrogate;
 use pyo3::buffer::PyBuffer;
 use pyo3::prelude::*;
 use rayon::prelude::*;
+use std::sync::Arc;
 
 /// Rows that one thread takes at a time.
 const SHARE: usize = 1024;
 
-fn law(name: &str, finger: Finger, reading: Option<&str>) -> Result<Box<dyn FrictionModel>, String> {
-    let reading = match reading {
-        None => None,
-        Some(word) => Some(
-            Reading::ALL
-                .into_iter()
-                .find(|r| r.name() == word)
-                .ok_or_else(|| format!("reading {word:?}: 'peak-to-peak' or 'sine-amplitude'"))?,
-        ),
+fn law(name: &str, finger: Finger, reading: Option<&str>) -> Result<Arc<dyn FrictionModel>, String> {
+    let Some(word) = reading else {
+        let no_law = || format!("law {name:?}: 'spring-slider', 'psi' or 'surrogate'");
+        return BuiltIn::by_name(name).ok_or_else(no_law)?.law(&finger).map_err(|e| e.to_string());
     };
-    if reading.is_some() && name != "psi" {
+    let no_reading = || format!("reading {word:?}: 'peak-to-peak' or 'sine-amplitude'");
+    let reading = Reading::ALL.into_iter().find(|r| r.name() == word).ok_or_else(no_reading)?;
+    if name != "psi" {
         return Err(format!("reading belongs to the law 'psi', not to {name:?}"));
     }
-    Ok(match (name, reading) {
-        ("spring-slider", _) => Box::new(SpringSlider::new(finger).map_err(|e| e.to_string())?),
-        ("psi", None) => Box::new(EmpiricalPsi::paper(finger).map_err(|e| e.to_string())?),
-        ("psi", Some(one)) => Box::new(EmpiricalPsi::read(finger, one).map_err(|e| e.to_string())?),
-        ("surrogate", _) => {
-            finger.check().map_err(|e| e.to_string())?;
-            Box::new(Surrogate::shipped().map_err(|e| e.to_string())?.for_finger(&finger))
-        }
-        _ => return Err(format!("law {name:?}: 'spring-slider', 'psi' or 'surrogate'")),
-    })
+    Ok(Arc::new(EmpiricalPsi::read(finger, reading).map_err(|e| e.to_string())?))
+}
+
+/// A condition by the columns that [`evaluate`] takes.
+fn condition(at: impl Fn(usize) -> f64) -> Condition {
+    Condition {
+        amplitude: PeakToPeak::from_metres(at(0)),
+        frequency_hz: at(1),
+        speed_m_s: at(2),
+        normal_force_n: at(3),
+        mu0: at(4),
+        ..Condition::paper()
+    }
 }
 
 /// A column of conditions, or the one value that holds in every row: a number that was given once is not copied a million times.
@@ -95,14 +96,9 @@ pub fn evaluate(
     let mut within = vec![0_u8; rows];
     let answered = py.detach(|| {
         let share = |(nth, ((mu, sd), within)): (usize, ((&mut [f64], &mut [f64]), &mut [u8]))| {
-            let mut condition = Condition::paper();
             for (k, ((mu, sd), within)) in mu.iter_mut().zip(sd).zip(within).enumerate() {
                 let row = nth * SHARE + k;
-                condition.amplitude = PeakToPeak::from_metres(given[0].at(row));
-                condition.frequency_hz = given[1].at(row);
-                condition.speed_m_s = given[2].at(row);
-                condition.normal_force_n = given[3].at(row);
-                condition.mu0 = given[4].at(row);
+                let condition = condition(|column| given[column].at(row));
                 let answer = law.relative_friction(&condition).map_err(|why| format!("row {row}: {why}"))?;
                 (*mu, *sd) = (answer.mu_relative, answer.sd);
                 *within = u8::from(answer.validity == Validity::Inside);
@@ -123,21 +119,15 @@ pub fn evaluate(
 /// Psi of Eq. 17 of columns: amplitude_pp_m, frequency_hz, speed_m_s, normal_force_n, mu0.
 fn groups(columns: &[Vec<f64>], poisson_ratio: f64) -> Result<Vec<PsiEq17>, String> {
     let of = |i: usize| {
-        let condition = Condition {
-            amplitude: PeakToPeak::from_metres(columns[0][i]),
-            frequency_hz: columns[1][i],
-            speed_m_s: columns[2][i],
-            normal_force_n: columns[3][i],
-            mu0: columns[4][i],
-            ..Condition::paper()
-        };
+        let condition = condition(|column| columns[column][i]);
         condition.check().map_err(|why| format!("row {i}: {why}"))?;
         Ok(PsiEq17::at(&condition, poisson_ratio))
     };
     (0..columns[0].len()).map(of).collect()
 }
 
-fn columns_of(py: Python<'_>, columns: &[PyBuffer<f64>; 5]) -> PyResult<Vec<Vec<f64>>> {
+/// Columns as numbers, if all are of one length.
+pub(crate) fn columns_of(py: Python<'_>, columns: &[PyBuffer<f64>]) -> PyResult<Vec<Vec<f64>>> {
     let values = columns.iter().map(|column| column.to_vec(py)).collect::<PyResult<Vec<_>>>()?;
     if values.iter().any(|column| column.len() != values[0].len()) {
         return Err(MuprimeError::new_err("columns of one length are needed"));

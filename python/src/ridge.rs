@@ -1,6 +1,7 @@
 //! Cases of the finite element ridge, on all cores.
 
 use crate::MuprimeError;
+use crate::laws::columns_of;
 use models::quantity::PeakToPeak;
 use models::ridge::{RidgeCase, RunSettings, case, run as solve};
 use pyo3::buffer::PyBuffer;
@@ -12,10 +13,7 @@ use rayon::prelude::*;
 #[pyfunction]
 #[pyo3(signature = (columns, elements))]
 pub fn ridge(py: Python<'_>, columns: [PyBuffer<f64>; 7], elements: usize) -> PyResult<String> {
-    let values = columns.iter().map(|column| column.to_vec(py)).collect::<PyResult<Vec<_>>>()?;
-    if values.iter().any(|column| column.len() != values[0].len()) {
-        return Err(MuprimeError::new_err("columns of one length are needed"));
-    }
+    let values = columns_of(py, &columns)?;
     let one = |row: usize| {
         let at = |column: usize| values[column][row];
         let case = RidgeCase {

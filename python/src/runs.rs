@@ -100,14 +100,11 @@ fn job(
             setup.file.name
         );
     }
-    let defects = match defects {
-        None => None,
-        Some(path) => {
-            let text = runs::input::text_of(path)?;
-            let read = sim::defects::Defects::parse(&text);
-            Some(read.map_err(|why| miette::miette!("{}: {why}", path.display()))?)
-        }
-    };
+    let defects = defects.map(|path| {
+        let read = sim::defects::Defects::parse(&runs::input::text_of(path)?);
+        read.map_err(|why| miette::miette!("{}: {why}", path.display()))
+    });
+    let defects = defects.transpose()?;
     let slider = Path::new(BuiltIn::SpringSlider.name());
     let tables::law::Loaded { model, file: model_file } =
         tables::law::for_run(model.unwrap_or(slider), &setup)?;

@@ -57,7 +57,6 @@ pub struct Comparator {
     noise: PassNoise,
     test: Sequential,
     power: Power,
-    passes: u32,
 }
 
 /// Relative width of the prior on `mu_0` before the first pass without vibration.
@@ -71,14 +70,8 @@ impl Comparator {
         covariance[0][0] = (mu0 * MU0_PRIOR_RELATIVE_SD).powi(2);
         covariance[1][1] = first * first;
         covariance[2][2] = second * second;
-        Comparator {
-            estimate: [mu0, 0.0, 0.0],
-            covariance,
-            noise,
-            test: Sequential::new(),
-            power: Power::default(),
-            passes: 0,
-        }
+        let (test, power) = Default::default();
+        Comparator { estimate: [mu0, 0.0, 0.0], covariance, noise, test, power }
     }
 
     /// `mu_0` as known now; `None` until a pass has measured it.
@@ -159,7 +152,6 @@ impl Comparator {
                 *cell -= left * right / variance;
             }
         }
-        self.passes += 1;
 
         let mu_relative = known.map(|m| friction_force_n / (m.value * c.normal_force_n));
         let measured_sd = self.noise.force_sd_n / coulomb;

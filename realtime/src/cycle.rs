@@ -5,12 +5,9 @@
 //! lock, no heap and no handle. The model is reached through `&`, and models hold plain tables.
 
 use crate::estimate::{EstimateConfig, Mu0, MuRelative, NoMu, Window};
-use crate::ports::{Nanos, SupplyCommand};
+use crate::ports::Nanos;
 use crate::render::{Render, Rendered};
-use crate::safety::{
-    Cause, Controls, Decision, DriveCommand, Exposed, Limits, Observation, Remark, Request, Safety,
-    StageCommand, State, Trip,
-};
+use crate::safety::{Controls, Decision, Exposed, Limits, Observation, Request, Safety, State};
 use models::condition::{Ambient, Condition};
 use models::prediction::FrictionModel;
 use models::quantity::{Direction, PeakToPeak};
@@ -144,18 +141,8 @@ pub struct Online {
 /// Everything a cycle says.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Outputs {
-    /// For the amplifier.
-    pub drive: DriveCommand,
-    /// For the stage.
-    pub stage: StageCommand,
-    /// For the second switch-off channel.
-    pub supply: SupplyCommand,
-    /// A trip latched in this cycle.
-    pub tripped: Option<Trip>,
-    /// The first rule that is broken now, latched or not.
-    pub blocking: Option<Cause>,
-    /// What stands in the way of arming; see [`Decision::waits_for`].
-    pub waits_for: Option<Cause>,
+    /// What safety decided.
+    pub decision: Decision,
     /// Whether the rig is armed after this cycle.
     pub armed: bool,
     /// Whether the second switch-off channel is being proved.
@@ -168,8 +155,6 @@ pub struct Outputs {
     pub online: Option<Online>,
     /// Both forces fit for use in this cycle.
     pub usable: bool,
-    /// Something is not as it should be, short of a trip.
-    pub remark: Option<Remark>,
     /// What the target wants here, and the amplitude that the next cycle requests for it.
     pub rendered: Option<Rendered>,
 }
@@ -213,18 +198,13 @@ pub fn judge(
     now: Nanos,
 ) -> Outputs {
     let seen = &inputs.seen;
-
     let usable = decision.lateral_usable && decision.normal_usable;
     if let (true, Ok(lateral), Ok(normal)) = (usable, &seen.forces.lateral, &seen.forces.normal) {
         state.window.push(&config.estimate, lateral, normal);
     }
     let direction = direction_of(state.request.velocity_m_s);
-    let age = [&seen.forces.lateral, &seen.forces.normal]
-        .into_iter()
-        .filter_map(|c| c.as_ref().ok())
-        .map(|r| r.age(now))
-        .max()
-        .unwrap_or_default();
+    let newest = [seen.forces.lateral, seen.forces.normal].into_iter().flatten();
+    let age = newest.map(|sample| sample.age(now)).max().unwrap_or_default();
     // Contact that is lost now is no `mu'` now, whatever the window still remembers.
     let lost = usable && seen.forces.normal.is_ok_and(|r| r.value < config.estimate.normal_force_min_n);
     let mu_relative = if lost {
@@ -235,21 +215,14 @@ pub fn judge(
     let online = mu_relative.ok().and_then(|mu| compare(config, model, state, seen, &mu, now));
     let rendered = render(config, model, state, seen, now);
 
-    let Decision { drive, stage, supply, tripped, blocking, waits_for, remark, .. } = *decision;
     Outputs {
-        drive,
-        stage,
-        supply,
-        tripped,
-        blocking,
-        waits_for,
+        decision: *decision,
         armed: state.safety.is_armed(),
         proving: state.safety.is_proving(),
         marker: state.marker,
         mu_relative,
         online,
         usable,
-        remark,
         rendered,
     }
 }
@@ -365,10 +338,7 @@ fn compare(
     let prediction = model.predict(&condition).ok()?;
     let sd = mu.sd.hypot(prediction.mu_relative_sd);
     // A model that has diverged has no opinion; nothing that is commanded depends on it.
-    if !(prediction.mu_relative.is_finite() && sd.is_finite() && sd > 0.0) {
-        return None;
-    }
-    Some(Online {
+    (prediction.mu_relative.is_finite() && sd.is_finite() && sd > 0.0).then(|| Online {
         predicted: prediction.mu_relative,
         predicted_sd: prediction.mu_relative_sd,
         z: (mu.value - prediction.mu_relative) / sd,

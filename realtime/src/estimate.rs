@@ -69,22 +69,12 @@ pub struct Window {
 
 impl Default for Window {
     fn default() -> Self {
-        Self::new()
+        let none = [0.0; WINDOW_MAX];
+        Window { lateral: none, normal: none, next: 0, filled: 0, lateral_sequence: None }
     }
 }
 
 impl Window {
-    /// An empty window.
-    pub const fn new() -> Self {
-        Window {
-            lateral: [0.0; WINDOW_MAX],
-            normal: [0.0; WINDOW_MAX],
-            next: 0,
-            filled: 0,
-            lateral_sequence: None,
-        }
-    }
-
     /// Forgets all samples: the condition has changed.
     pub fn clear(&mut self) {
         (self.next, self.filled) = (0, 0);

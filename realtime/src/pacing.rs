@@ -13,9 +13,9 @@ use serde::{Deserialize, Serialize};
 use std::sync::atomic::{AtomicBool, AtomicU64, Ordering};
 
 #[cfg(target_os = "linux")]
-pub(crate) use machine::sleep_until;
-#[cfg(target_os = "linux")]
 pub use machine::{ask_for_real_time, monotonic_ns, process_cpu_ns};
+#[cfg(target_os = "linux")]
+pub(crate) use machine::{pin_to, sleep_until};
 #[cfg(target_os = "linux")]
 pub use thread::{LoopParts, lateness_of_sleep, run};
 

@@ -92,25 +92,26 @@ pub struct Row {
 impl Row {
     /// The row of a cycle.
     pub fn of(cycle: u64, now: Nanos, inputs: &Inputs, out: &Outputs) -> Self {
+        let decision = &out.decision;
         Row {
             cycle,
             now,
             inputs: *inputs,
-            drive_pp_m: out.drive.amplitude().metres(),
-            drive_hz: out.drive.frequency_hz(),
-            velocity_m_s: out.stage.velocity_m_s(),
-            load_n: out.stage.normal_force_n(),
+            drive_pp_m: decision.drive.amplitude().metres(),
+            drive_hz: decision.drive.frequency_hz(),
+            velocity_m_s: decision.stage.velocity_m_s(),
+            load_n: decision.stage.normal_force_n(),
             marker: out.marker,
             armed: out.armed,
             proving: out.proving,
-            supply_cut: out.supply == SupplyCommand::Cut,
-            tripped: out.tripped,
-            blocking: out.blocking,
-            waits_for: out.waits_for,
+            supply_cut: decision.supply == SupplyCommand::Cut,
+            tripped: decision.tripped,
+            blocking: decision.blocking,
+            waits_for: decision.waits_for,
             mu_relative: out.mu_relative,
             online: out.online,
             usable: out.usable,
-            remark: out.remark,
+            remark: decision.remark,
             rendered: out.rendered,
         }
     }

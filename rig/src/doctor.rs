@@ -75,19 +75,6 @@ pub struct Look {
     pub stalls: StallReport,
 }
 
-#[derive(Default)]
-struct Followed {
-    lateral: Follow,
-    normal: Follow,
-    amplifier: Follow,
-    amplitude: Follow,
-    temperature: Follow,
-    position: Follow,
-    velocity: Follow,
-    supply: Follow,
-    contacts: Follow,
-}
-
 fn of_channel(channel: Channel) -> Result<Seen, NoData> {
     channel.map(|r| Seen {
         value: r.value,
@@ -102,68 +89,55 @@ fn of_state(value: f64, taken_at: Nanos, sequence: u32) -> Seen {
     Seen { value, raw: None, taken_at, sequence, quality: realtime::ports::Quality::Good }
 }
 
-impl Followed {
-    fn look(&mut self, seen: &Observation, now: Nanos) {
-        self.lateral.look(of_channel(seen.forces.lateral), now);
-        self.normal.look(of_channel(seen.forces.normal), now);
-        let a = seen.amplifier;
-        self.amplifier.look(a.map(|a| of_state(f64::from(a.output_on), a.taken_at, a.sequence)), now);
-        self.amplitude.look(a.and_then(|a| of_channel(a.amplitude)), now);
-        self.temperature.look(a.and_then(|a| of_channel(a.temperature_c)), now);
-        let s = seen.stage;
-        self.position.look(s.map(|s| of_state(s.position_m, s.taken_at, s.sequence)), now);
-        self.velocity.look(s.map(|s| of_state(s.velocity_m_s, s.taken_at, s.sequence)), now);
-        self.supply.look(seen.supply.map(|s| of_state(f64::from(!s.cut), s.taken_at, s.sequence)), now);
-        let c = seen.contacts;
-        let fitted = [c.emergency_stop, c.interlock, c.dead_man];
-        let fitted = fitted.into_iter().find(|c| *c != Err(NoData::NotFitted));
-        let fitted = fitted.unwrap_or(Err(NoData::NotFitted));
-        self.contacts.look(fitted.map(|c| of_state(f64::from(c.closed), c.taken_at, c.sequence)), now);
-    }
+/// What a channel is and shows: the instrument that it is of, its name, its unit, its timing, what was seen.
+type Shown = (Role, &'static str, &'static str, fn(&Timing) -> &ChannelTiming, Result<Seen, NoData>);
 
-    /// The channels of one instrument; each is reported once.
-    fn reports(
-        &mut self,
-        of: &Opened<'_>,
-        last: Option<&Observation>,
-        timing: &Timing,
-        seconds: f64,
-    ) -> Vec<ChannelReport> {
-        let mut all = Vec::new();
-        let mut take = |follow: &mut Follow, name, unit, timing: &ChannelTiming| {
-            all.push(std::mem::take(follow).report(name, unit, timing, seconds));
-        };
-        match of.role {
-            "force" => {
-                if of.axes.0 {
-                    take(&mut self.lateral, "lateral", "N", &timing.lateral);
-                }
-                if of.axes.1 {
-                    take(&mut self.normal, "normal", "N", &timing.normal);
-                }
-            }
-            "amplifier" => {
-                take(&mut self.amplifier, "output", "1", &timing.amplifier);
-                let amplifier = last.and_then(|l| l.amplifier.ok());
-                let fitted = |c: fn(&AmplifierState) -> Channel| {
-                    amplifier.is_some_and(|a| c(&a) != Err(NoData::NotFitted))
-                };
-                if fitted(|a| a.amplitude) {
-                    take(&mut self.amplitude, "amplitude", "m", &timing.amplifier);
-                }
-                if fitted(|a| a.temperature_c) {
-                    take(&mut self.temperature, "temperature", "degC", &timing.amplifier);
-                }
-            }
-            "stage" => {
-                take(&mut self.position, "position", "m", &timing.stage);
-                take(&mut self.velocity, "velocity", "m/s", &timing.stage);
-            }
-            "supply_relay" => take(&mut self.supply, "closed", "1", &timing.supply),
-            _ => take(&mut self.contacts, "contacts", "1", &timing.contacts),
-        }
-        all
-    }
+fn channels(seen: &Observation) -> [Shown; 9] {
+    let (f, a, s, c) = (&seen.forces, seen.amplifier, seen.stage, seen.contacts);
+    let output = a.map(|a| of_state(f64::from(a.output_on), a.taken_at, a.sequence));
+    let position = s.map(|s| of_state(s.position_m, s.taken_at, s.sequence));
+    let velocity = s.map(|s| of_state(s.velocity_m_s, s.taken_at, s.sequence));
+    let closed = seen.supply.map(|s| of_state(f64::from(!s.cut), s.taken_at, s.sequence));
+    let fitted = [c.emergency_stop, c.interlock, c.dead_man];
+    let fitted = fitted.into_iter().find(|c| *c != Err(NoData::NotFitted));
+    let fitted = fitted.unwrap_or(Err(NoData::NotFitted));
+    let contacts = fitted.map(|c| of_state(f64::from(c.closed), c.taken_at, c.sequence));
+    [
+        ("force", "lateral", "N", |t| &t.lateral, of_channel(f.lateral)),
+        ("force", "normal", "N", |t| &t.normal, of_channel(f.normal)),
+        ("amplifier", "output", "1", |t| &t.amplifier, output),
+        ("amplifier", "amplitude", "m", |t| &t.amplifier, a.and_then(|a| of_channel(a.amplitude))),
+        ("amplifier", "temperature", "degC", |t| &t.amplifier, a.and_then(|a| of_channel(a.temperature_c))),
+        ("stage", "position", "m", |t| &t.stage, position),
+        ("stage", "velocity", "m/s", |t| &t.stage, velocity),
+        ("supply_relay", "closed", "1", |t| &t.supply, closed),
+        ("safety_inputs", "contacts", "1", |t| &t.contacts, contacts),
+    ]
+}
+
+/// The channels of one instrument, as they were followed; each is reported once.
+fn reports(
+    followed: &mut [Follow; 9],
+    of: &Opened<'_>,
+    last: &Observation,
+    timing: &Timing,
+    seconds: f64,
+) -> Vec<ChannelReport> {
+    let fitted =
+        |c: fn(&AmplifierState) -> Channel| last.amplifier.is_ok_and(|a| c(&a) != Err(NoData::NotFitted));
+    let is_there = |name: &str| match name {
+        "lateral" => of.axes.0,
+        "normal" => of.axes.1,
+        "amplitude" => fitted(|a| a.amplitude),
+        "temperature" => fitted(|a| a.temperature_c),
+        _ => true,
+    };
+    let own = followed.iter_mut().zip(channels(last));
+    let own = own.filter(|(_, (role, name, ..))| *role == of.role && is_there(name));
+    own.map(|(follow, (_, name, unit, timing_of, _))| {
+        std::mem::take(follow).report(name, unit, timing_of(timing), seconds)
+    })
+    .collect()
 }
 
 impl Look {
@@ -200,11 +174,8 @@ impl Rules {
             amplifier.fault = false;
         }
         let inputs = Inputs { commands: [None; COMMANDS_PER_CYCLE], seen: judged };
-        let blocking = decide(&self.config, &mut self.state, &inputs, now).blocking;
-        if !counts {
-            return;
-        }
-        self.cycles += 1;
+        let blocking = decide(&self.config, &mut self.state, &inputs, now).blocking.filter(|_| counts);
+        self.cycles += u32::from(counts);
         let explained = |cause: &Cause| open && cause.may_be_an_open_supply();
         let Some(cause) = blocking.filter(|cause| !explained(cause)) else { return };
         match self.blocked.iter_mut().find(|(c, _)| *c == cause) {
@@ -227,7 +198,7 @@ pub fn look(setup: &Setup, instruments: &InstrumentsSetup) -> Look {
     let (all, mut bench) = ports::open(setup, instruments, epoch);
     let monitor = StallMonitor::start(realtime::pacing::monotonic_ns());
     let mut rules = Rules::of(setup, bench.supply.is_some());
-    let mut followed = Followed::default();
+    let mut followed = <[Follow; 9]>::default();
     let counted = || -> Vec<HealthReport> { all.iter().map(Opened::health).collect() };
     let (opened, cycle) = (Instant::now(), Duration::from_nanos(setup.config.limits.timing.cycle.0));
     let (mut before, mut last, mut deadline) = (None, None, opened);
@@ -239,7 +210,7 @@ pub fn look(setup: &Setup, instruments: &InstrumentsSetup) -> Look {
         rules.step(&seen, now, opened.elapsed() > LOOK / 2);
         if opened.elapsed() > SETTLING {
             before.get_or_insert_with(|| (counted(), Instant::now()));
-            followed.look(&seen, now);
+            followed.iter_mut().zip(channels(&seen)).for_each(|(follow, (.., seen))| follow.look(seen, now));
             last = Some(seen);
         }
     }
@@ -249,22 +220,23 @@ pub fn look(setup: &Setup, instruments: &InstrumentsSetup) -> Look {
     let (before, began) = before.unwrap_or_else(|| (after.clone(), opened));
     let seconds = began.elapsed().as_secs_f64();
     let whole = all.iter().all(|o| o.link.is_ok());
+    let last = last.unwrap_or_else(|| bench.look(Nanos(0)));
     let found = all.into_iter().zip(before.iter().zip(&after)).map(|(o, (before, after))| Found {
         role: o.role,
         id: o.instrument.profile.clone(),
         address: o.instrument.address.clone(),
         channels: match &o.link {
-            Ok(_) => followed.reports(&o, last.as_ref(), &setup.config.limits.timing, seconds),
+            Ok(_) => reports(&mut followed, &o, &last, &setup.config.limits.timing, seconds),
             Err(_) => Vec::new(),
         },
         answers: o.link.map(|_link| answers(o.instrument, before, after, seconds)),
     });
     Look {
         found: found.collect(),
-        amplifier: bench.amplifier.and(last.map(|l| l.amplifier)),
-        stage: bench.stage.and(last.map(|l| l.stage)),
-        supply: bench.supply.and(last.map(|l| l.supply)),
-        contacts: bench.contacts.and(last.map(|l| l.contacts)),
+        amplifier: bench.amplifier.map(|_| last.amplifier),
+        stage: bench.stage.map(|_| last.stage),
+        supply: bench.supply.map(|_| last.supply),
+        contacts: bench.contacts.map(|_| last.contacts),
         blocking: rules.worst().filter(|_| whole),
         stalls,
     }

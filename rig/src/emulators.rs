@@ -17,27 +17,23 @@ use sim::wire::serial::SerialEmulator;
 use sim::wire::streams::NetworkStream;
 use sim::wire::sysfs::SysfsFolder;
 use sim::wire::{Command, Quantity, SharedPlant};
+use std::any::Any;
 use std::collections::BTreeMap;
 use std::net::SocketAddr;
 
 /// Running emulators; dropping them stops them.
 #[derive(Default)]
 pub struct Embedded {
-    tcp: Vec<ModbusTcpServer>,
-    serial: Vec<SerialEmulator>,
-    can: Vec<CanEmulator>,
-    lines: Vec<TcpLines>,
-    streams: Vec<NetworkStream>,
-    folders: Vec<SysfsFolder>,
+    serving: Vec<Box<dyn Any + Send>>,
+    /// Where the Modbus TCP server listens, if there is one.
+    pub modbus_tcp: Option<SocketAddr>,
     /// Where each instrument is, in words.
     pub places: Vec<String>,
 }
 
 impl Embedded {
-    /// Where the Modbus TCP server listens, if there is one.
-    #[must_use]
-    pub fn modbus_tcp(&self) -> Option<SocketAddr> {
-        self.tcp.first().map(ModbusTcpServer::address)
+    fn serve(&mut self, emulator: impl Any + Send) {
+        self.serving.push(Box::new(emulator));
     }
 }
 
@@ -87,6 +83,9 @@ impl Serving<'_> {
         let link = profile.description.link.clone();
         let device = mounted(profile, instrument)?;
         let failed = |error: std::io::Error| format!("{} cannot be served: {error}", instrument.profile);
+        let twice = |of: &str, unit: u8| {
+            format!("two instruments {of} have Modbus unit {unit}; give one another `unit`")
+        };
         match link.kind {
             LinkKind::ModbusTcp if !instrument.address.starts_with("rtu:") => {
                 let unit = instrument.unit.or(link.unit).unwrap_or(1);
@@ -94,9 +93,7 @@ impl Serving<'_> {
                 // A board that is relay and inputs at once is named twice and served once.
                 let other = |served: &Device| served.profile().id() != instrument.profile;
                 if units.insert(unit, device).is_some_and(|served| other(&served)) {
-                    return Err(format!(
-                        "two instruments of the virtual rig have Modbus unit {unit}; give one another `unit`"
-                    ));
+                    return Err(twice("of the virtual rig", unit));
                 }
             }
             LinkKind::ModbusTcp | LinkKind::ModbusRtu => {
@@ -104,16 +101,11 @@ impl Serving<'_> {
                 if instrument.address.ends_with("pty") {
                     let port = port(&mut instrument.address)?;
                     let units = [(unit, device)].into_iter().collect();
-                    embedded
-                        .serial
-                        .push(SerialEmulator::modbus_rtu(port, units, plant.clone()).map_err(failed)?);
+                    embedded.serve(SerialEmulator::modbus_rtu(port, units, plant.clone()).map_err(failed)?);
                 } else {
                     let units = self.lines.entry(instrument.address.clone()).or_default();
                     if units.insert(unit, device).is_some() {
-                        let at = &instrument.address;
-                        return Err(format!(
-                            "two instruments at {at} have Modbus unit {unit}; give one another `unit`"
-                        ));
+                        return Err(twice(&format!("at {}", instrument.address), unit));
                     }
                 }
             }
@@ -122,9 +114,8 @@ impl Serving<'_> {
                 let devices = CanDevice { device, base };
                 if instrument.address.starts_with("slcan:") {
                     let adapter = EmulatedAdapter::new(port(&mut instrument.address)?);
-                    let emulator =
-                        CanEmulator::start(adapter, vec![devices], plant.clone()).map_err(failed)?;
-                    embedded.can.push(emulator);
+                    embedded
+                        .serve(CanEmulator::start(adapter, vec![devices], plant.clone()).map_err(failed)?);
                 } else {
                     self.buses.entry(instrument.address.clone()).or_default().push(devices);
                 }
@@ -136,25 +127,25 @@ impl Serving<'_> {
                 } else {
                     SerialEmulator::lines(port, LineInstrument::new(device, plant.clone()), || None)
                 };
-                embedded.serial.push(served.map_err(failed)?);
+                embedded.serve(served.map_err(failed)?);
             }
             LinkKind::Tcp | LinkKind::Udp if device.profile().description.stream.is_some() => {
                 let place = socket(&instrument.address, everywhere)?;
                 let served = NetworkStream::start(place, device, plant.clone()).map_err(failed)?;
                 instrument.address = served.address().to_string();
-                embedded.streams.push(served);
+                embedded.serve(served);
             }
             LinkKind::Sysfs => {
                 let served = SysfsFolder::start(device, plant.clone()).map_err(failed)?;
                 instrument.address = served.path().display().to_string();
-                embedded.folders.push(served);
+                embedded.serve(served);
             }
             LinkKind::Scpi | LinkKind::Tcp | LinkKind::Udp => {
                 let served = LineInstrument::new(device, plant.clone());
                 let server =
                     TcpLines::start(socket(&instrument.address, everywhere)?, served).map_err(failed)?;
                 instrument.address = server.address().to_string();
-                embedded.lines.push(server);
+                embedded.serve(server);
             }
         }
         Ok(())
@@ -169,17 +160,18 @@ impl Serving<'_> {
             for instrument in all.iter_mut().filter(|instrument| instrument.address == address) {
                 instrument.address = server.address().to_string();
             }
-            embedded.tcp.push(server);
+            embedded.modbus_tcp.get_or_insert(server.address());
+            embedded.serve(server);
         }
         for (mut address, units) in self.lines {
             let port = port(&mut address)?;
             let failed = |error: std::io::Error| format!("{address} cannot be served: {error}");
-            embedded.serial.push(SerialEmulator::modbus_rtu(port, units, plant.clone()).map_err(failed)?);
+            embedded.serve(SerialEmulator::modbus_rtu(port, units, plant.clone()).map_err(failed)?);
         }
         for (interface, devices) in self.buses {
             let bus = KernelCan::open(&interface).map_err(|error| error.to_string())?;
             let emulator = CanEmulator::start(bus, devices, plant.clone());
-            embedded.can.push(emulator.map_err(|error| error.to_string())?);
+            embedded.serve(emulator.map_err(|error| error.to_string())?);
         }
         Ok(embedded)
     }

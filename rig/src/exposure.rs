@@ -164,17 +164,15 @@ impl Ledger {
         let books = known.iter().map(open).collect::<miette::Result<Vec<_>>>()?;
         let mut ledger = Ledger { books, rest, strongest_m2_s2: strongest * strongest };
         let (_, now_ns) = machine_time().map_err(|e| miette::miette!("this machine tells no time: {e}"))?;
-        ledger.write_ahead(now_ns).map_err(|e| {
-            miette::miette!(
-                help = "give this user the right to write it",
-                "the ledger cannot be written: {e}"
-            )
-        })?;
+        let help = "give this user the right to write it";
+        let written = ledger.write_ahead(now_ns);
+        written.map_err(|e| miette::miette!(help = help, "the ledger cannot be written: {e}"))?;
         Ok(ledger)
     }
 
     /// What the loop takes over from earlier runs: in each part the worst of all books.
     pub fn exposed(&self) -> Exposed {
+        let worst = |a, b| joined(a, b, Nanos::max, f64::max);
         self.books.iter().map(Book::exposed).reduce(worst).unwrap_or_default()
     }
 
@@ -251,13 +249,11 @@ impl Ledger {
     }
 }
 
-/// The worse of two exposures, part by part.
-fn worst(a: Exposed, b: Exposed) -> Exposed {
-    let mut parts = a.parts;
-    for (worse, other) in parts.iter_mut().zip(b.parts) {
-        *worse = (worse.0.max(other.0), worse.1.max(other.1));
-    }
-    Exposed { in_one_go: a.in_one_go.max(b.in_one_go), resting: rested(&a, &b), parts }
+/// Two exposures as one, part by part: their times and doses as these join them.
+fn joined(a: Exposed, b: Exposed, times: fn(Nanos, Nanos) -> Nanos, doses: fn(f64, f64) -> f64) -> Exposed {
+    let part = |at: usize| (times(a.parts[at].0, b.parts[at].0), doses(a.parts[at].1, b.parts[at].1));
+    let (in_one_go, resting) = (times(a.in_one_go, b.in_one_go), rested(&a, &b));
+    Exposed { in_one_go, resting, parts: std::array::from_fn(part) }
 }
 
 /// Time rested since the later of two goes; where one of them drove nothing, since the other.
@@ -297,9 +293,8 @@ impl Book {
         };
         let entry = found(&file, &path)?;
         let mut others = Vec::new();
-        for one in
-            std::fs::read_dir(folder).map_err(|e| miette::miette!("{}: {e}", folder.display()))?.flatten()
-        {
+        let all = std::fs::read_dir(folder).map_err(|e| miette::miette!("{}: {e}", folder.display()))?;
+        for one in all.flatten() {
             let name = one.file_name().to_string_lossy().into_owned();
             let owner =
                 name.strip_prefix(&stem).and_then(|rest| rest.strip_suffix(".exposure")?.parse().ok());
@@ -316,14 +311,9 @@ impl Book {
     /// What all users drove.
     fn exposed(&self) -> Exposed {
         let now_ns = self.entry.until_ns;
-        let all = self.others.iter().map(|entry| entry.exposed(now_ns));
-        all.fold(self.entry.exposed(now_ns), |sum, other| {
-            let mut parts = sum.parts;
-            for (part, more) in parts.iter_mut().zip(other.parts) {
-                *part = (part.0.plus(more.0), part.1 + more.1);
-            }
-            Exposed { in_one_go: sum.in_one_go.plus(other.in_one_go), resting: rested(&sum, &other), parts }
-        })
+        let others = self.others.iter().map(|entry| entry.exposed(now_ns));
+        let sum = |sum, other| joined(sum, other, Nanos::plus, |sum, dose| sum + dose);
+        others.fold(self.entry.exposed(now_ns), sum)
     }
 
     fn write(&mut self, mut entry: Entry) -> io::Result<()> {
@@ -370,11 +360,9 @@ fn open_owned(path: &Path, owner: u32, own: bool) -> io::Result<File> {
         opened => opened,
     }?;
     let found = file.metadata()?;
-    let plain = found.is_file() && found.nlink() == 1 && found.uid() == owner;
-    match plain && found.mode() & 0o022 == 0 {
-        true => Ok(file),
-        false => Err(io::Error::other("it is not a plain file that its owner alone can write")),
-    }
+    let plain = found.is_file() && found.nlink() == 1 && found.uid() == owner && found.mode() & 0o022 == 0;
+    let other = "it is not a plain file that its owner alone can write";
+    if plain { Ok(file) } else { Err(io::Error::other(other)) }
 }
 
 /// What the thread that keeps a ledger shows of itself.

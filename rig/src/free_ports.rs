@@ -27,7 +27,7 @@ pub fn free(setup: &Setup) -> miette::Result<()> {
     let mut wrong = Problems::of(&setup.origin, &setup.text);
     let served = setup.file.virtual_rig.is_some();
     let mut tried = BTreeSet::new();
-    for (table, instrument) in setup.by_table() {
+    for (table, instrument) in setup.file.by_table() {
         // One line or one device server may carry several.
         if !tried.insert(instrument.address.clone()) {
             continue;
@@ -81,12 +81,8 @@ fn opens(instrument: &InstrumentSetup) -> Result<(), Closed> {
         let found = resolve(address, port)
             .map_err(|e| (e.to_string(), "correct the address; `--offline` leaves the ports out"))?;
         let accepted = TcpStream::connect_timeout(&found, ACCEPTS_WITHIN);
-        accepted.map(drop).map_err(|e| {
-            (
-                format!("nobody accepts there: {e}"),
-                "switch it on, check cable and address; `--offline` leaves the ports out",
-            )
-        })
+        let remedy = "switch it on, check cable and address; `--offline` leaves the ports out";
+        accepted.map(drop).map_err(|e| (format!("nobody accepts there: {e}"), remedy))
     };
     match kind {
         LinkKind::ModbusTcp if !address.starts_with("rtu:") => socket(address),
@@ -104,21 +100,17 @@ fn opens(instrument: &InstrumentSetup) -> Result<(), Closed> {
 fn line(path: &Path) -> Result<(), Closed> {
     let flags = libc::O_NOCTTY | libc::O_NONBLOCK;
     let opened = OpenOptions::new().read(true).write(true).custom_flags(flags).open(path);
-    match opened {
-        Ok(file) => {
-            let is_line = file.metadata().is_ok_and(|m| m.file_type().is_char_device());
-            if is_line {
-                Ok(())
-            } else {
-                Err(("that is not a serial line".into(), "name the device, as in /dev/ttyUSB0"))
+    let file = opened.map_err(|e| {
+        let remedy = match e.raw_os_error() {
+            _ if e.kind() == std::io::ErrorKind::PermissionDenied => {
+                "give the user the group that owns it, mostly `dialout`"
             }
-        }
-        Err(e) if e.kind() == std::io::ErrorKind::PermissionDenied => {
-            Err((format!("cannot be opened: {e}"), "give the user the group that owns it, mostly `dialout`"))
-        }
-        Err(e) if e.raw_os_error() == Some(libc::EBUSY) => {
-            Err((format!("cannot be opened: {e}"), "another program holds it: end that"))
-        }
-        Err(e) => Err((format!("cannot be opened: {e}"), PLUG)),
-    }
+            Some(libc::EBUSY) => "another program holds it: end that",
+            _ => PLUG,
+        };
+        (format!("cannot be opened: {e}"), remedy)
+    })?;
+    let is_line = file.metadata().is_ok_and(|m| m.file_type().is_char_device());
+    let other = ("that is not a serial line".into(), "name the device, as in /dev/ttyUSB0");
+    if is_line { Ok(()) } else { Err(other) }
 }

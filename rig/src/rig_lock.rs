@@ -87,26 +87,19 @@ fn take(folder: &Path, identity: &str) -> miette::Result<File> {
 /// Opens a file that every user can open, and makes it where there is none. Nothing is followed, and nothing
 /// but a plain file is taken. Another user's may be open for reading only.
 pub(crate) fn open_shared(path: &Path) -> io::Result<File> {
-    let options = |write: bool| {
-        let mut options = OpenOptions::new();
-        options.read(true).write(write);
-        options
-    };
     // Never with O_CREAT where the file exists: in a sticky folder kernels refuse that for another user's file.
-    let open = |mut options: OpenOptions| open_plain(path, &mut options);
-    match open(options(true)) {
-        Err(e) if e.kind() == io::ErrorKind::NotFound => {
-            match open_plain(path, options(true).create_new(true)) {
-                Ok(file) => {
-                    // Whatever the mask of this user: the next one must see who holds it.
-                    file.set_permissions(Permissions::from_mode(0o666))?;
-                    Ok(file)
-                }
-                Err(e) if e.kind() == io::ErrorKind::AlreadyExists => open(options(true)),
-                Err(e) => Err(e),
+    let open = |write, new| open_plain(path, OpenOptions::new().read(true).write(write).create_new(new));
+    match open(true, false) {
+        Err(e) if e.kind() == io::ErrorKind::NotFound => match open(true, true) {
+            Ok(file) => {
+                // Whatever the mask of this user: the next one must see who holds it.
+                file.set_permissions(Permissions::from_mode(0o666))?;
+                Ok(file)
             }
-        }
-        Err(e) if e.kind() == io::ErrorKind::PermissionDenied => open(options(false)),
+            Err(e) if e.kind() == io::ErrorKind::AlreadyExists => open(true, false),
+            Err(e) => Err(e),
+        },
+        Err(e) if e.kind() == io::ErrorKind::PermissionDenied => open(false, false),
         opened => opened,
     }
 }

@@ -169,8 +169,13 @@ type Connected = (Option<(Embedded, SharedPlant)>, Bench, drivers::Rig);
 /// Serves the virtual rig where the setup has one, and opens the instruments.
 fn connect(job: &Job, sequence: &Sequence, answers: Answers, clock: &Clock) -> miette::Result<Connected> {
     let mut instruments = job.setup.instruments();
-    let simulated = job.setup.file.virtual_rig.is_some();
-    let embedded = simulated.then(|| embed(job, &mut instruments, clock.clone())).transpose()?;
+    let mut embedded = None;
+    if job.setup.file.virtual_rig.is_some() {
+        // The real places are put into the setup's.
+        let plant = SharedPlant::new(sim::wire::world::WorldPlant::new(job.world()?), clock.clone());
+        let served = crate::emulators::embed(&mut instruments, &plant, false);
+        embedded = Some((served.map_err(|problem| miette::miette!("{problem}"))?, plant));
+    }
     let air = embedded.as_ref().map(|(_, plant)| World::Served(plant.clone()));
     let bench = Bench::open(sequence, instruments.chamber.as_ref(), air, answers)?;
     let rig = drivers::open(&instruments, clock.clone()).map_err(|e| {
@@ -267,15 +272,4 @@ fn pass_on(
 /// A fault of this program, after the rig was touched.
 fn fault(what: &'static str) -> miette::Report {
     miette::miette!("{what}").wrap_err(Unfinished::Internal)
-}
-
-/// Serves the virtual rig where the setup looks for its instruments, and puts the real places there.
-fn embed(
-    job: &Job,
-    instruments: &mut drivers::InstrumentsSetup,
-    clock: Clock,
-) -> miette::Result<(Embedded, SharedPlant)> {
-    let plant = SharedPlant::new(sim::wire::world::WorldPlant::new(job.world()?), clock);
-    let embedded = crate::emulators::embed(instruments, &plant, false);
-    Ok((embedded.map_err(|problem| miette::miette!("{problem}"))?, plant))
 }

@@ -110,18 +110,10 @@ impl Watch {
         let ctrl_c = if own { CtrlC::Signal } else { CtrlC::Key };
         // The screen first: where it is refused, no keys were taken.
         terminal::show().map_err(refused)?;
-        let keys = if dead_man {
-            Keys::DeadMan
-        } else {
-            terminal::listen(ctrl_c).map_or_else(Keys::None, |()| Keys::Here)
-        };
-        let seen = Seen {
-            view: View::default(),
-            source: Source::default(),
-            heard: Instant::now(),
-            note: None,
-            help: false,
-        };
+        let listen = || terminal::listen(ctrl_c).map_or_else(Keys::None, |()| Keys::Here);
+        let keys = if dead_man { Keys::DeadMan } else { listen() };
+        let (view, source) = (View::default(), Source::default());
+        let seen = Seen { view, source, heard: Instant::now(), note: None, help: false };
         let (hand, seen) = (Hand::of(lead), Mutex::new(seen));
         let shared = Shared { folder: folder.into(), seen, over: AtomicBool::new(false), hand, keys, own };
         let shared = Arc::new(shared);

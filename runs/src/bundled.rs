@@ -14,10 +14,8 @@ pub(crate) fn names(list: &[(&str, &str)]) -> String {
     list.iter().map(|(name, _)| *name).collect::<Vec<_>>().join(", ")
 }
 
-/// The text of that name in the list of a kind of file, or of the file at that path, and the file's folder.
-///
-/// # Errors
-/// There is none, or it cannot be read.
+/// The text of that name in the list of a kind of file, or of the file at that path, and the file's folder;
+/// an error where there is none, or it cannot be read.
 pub(crate) fn load<'a>(
     kind: &str,
     list: &[(&str, &'static str)],

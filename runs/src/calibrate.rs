@@ -16,59 +16,49 @@ mod phase;
 mod tables;
 
 use crate::setup::Setup;
-use calibration::certificate::{Certificate, CertificateKind, Instrument, Occasion, Outcome, RawData, date};
+use calibration::certificate::{
+    Certificate, CertificateKind, Circumstances, Instrument, Occasion, Outcome, Parameter, RawData, Verified,
+    date,
+};
 use drivers::vibrometer::Settings;
 use miette::IntoDiagnostic;
 use models::quantity::PeakToPeak;
+use serde_json::json;
 use std::path::{Path, PathBuf};
 use std::time::{SystemTime, UNIX_EPOCH};
 
-/// What only instruments at a bench can give.
+/// What only instruments at a bench can give; without a bench whatever would open one is refused.
+///
+/// # Errors
+/// No instruments here, or what went wrong with them.
 pub trait Bench {
     /// A dead-weight series, taken with an operator; as CSV.
-    ///
-    /// # Errors
-    /// No instruments here, or what went wrong with them.
-    fn series(&self, options: &SeriesOptions<'_>) -> miette::Result<String>;
+    fn series(&self, _: &SeriesOptions<'_>) -> miette::Result<String> {
+        Err(refused())
+    }
 
     /// A table of set-points and amplitudes, driven and read; as CSV.
-    ///
-    /// # Errors
-    /// As [`Bench::series`].
-    fn amplitudes(&self, setup: &Setup, table: &LiveTable<'_>) -> miette::Result<String>;
+    fn amplitudes(&self, _setup: &Setup, _: &LiveTable<'_>) -> miette::Result<String> {
+        Err(refused())
+    }
 
     /// The settings of the vibrometer's controller, read back now; they cover the drive's frequency.
-    ///
-    /// # Errors
-    /// As [`Bench::series`].
-    fn vibrometer(&self, setup: &Setup, frequency_hz: f64) -> miette::Result<Settings>;
-}
-
-/// No bench: whatever would open an instrument is refused.
-pub struct FilesAlone;
-
-impl FilesAlone {
-    fn refused() -> miette::Report {
-        miette::miette!(
-            help = "`muprime calibrate` does that, with the operator at the bench",
-            "from files alone: a series, a table or waveforms are needed, and no setup whose instruments would be opened"
-        )
+    fn vibrometer(&self, _setup: &Setup, _frequency_hz: f64) -> miette::Result<Settings> {
+        Err(refused())
     }
 }
 
-impl Bench for FilesAlone {
-    fn series(&self, _: &SeriesOptions<'_>) -> miette::Result<String> {
-        Err(Self::refused())
-    }
-
-    fn amplitudes(&self, _: &Setup, _: &LiveTable<'_>) -> miette::Result<String> {
-        Err(Self::refused())
-    }
-
-    fn vibrometer(&self, _: &Setup, _: f64) -> miette::Result<Settings> {
-        Err(Self::refused())
-    }
+fn refused() -> miette::Report {
+    miette::miette!(
+        help = "`muprime calibrate` does that, with the operator at the bench",
+        "from files alone: a series, a table or waveforms are needed, and no setup whose instruments would be opened"
+    )
 }
+
+/// No bench.
+struct FilesAlone;
+
+impl Bench for FilesAlone {}
 
 /// How a dead-weight series is taken and where it is stored.
 pub struct SeriesOptions<'a> {
@@ -207,17 +197,14 @@ pub fn displacement(volts: f64, range_m_s_per_v: f64, frequency_hz: f64) -> Resu
 
 /// What `--json` says of a certificate.
 pub fn document(certificate: &Certificate) -> serde_json::Value {
-    let parameters: Vec<serde_json::Value> = certificate
-        .parameters
-        .iter()
-        .map(|p| {
-            serde_json::json!({
-                "name": p.name, "value": p.value, "unit": p.unit,
-                "standard_uncertainty": p.standard_uncertainty, "ci95": p.ci95,
-            })
+    let parameter = |p: &Parameter| {
+        json!({
+            "name": p.name, "value": p.value, "unit": p.unit,
+            "standard_uncertainty": p.standard_uncertainty, "ci95": p.ci95,
         })
-        .collect();
-    serde_json::json!({
+    };
+    let parameters: Vec<serde_json::Value> = certificate.parameters.iter().map(parameter).collect();
+    json!({
         "kind": certificate.kind, "serial": certificate.instrument.serial,
         "content_sha256": certificate.content_sha256, "valid_until": certificate.validity.until,
         "parameters": parameters, "remarks": certificate.remarks,
@@ -248,10 +235,8 @@ impl Issued {
     }
 }
 
-/// Checks a certificate's text: its shape, its hash, what its numbers can be, and whether its time is over.
-///
-/// # Errors
-/// What is wrong with it.
+/// Checks a certificate's text: its shape, its hash, what its numbers can be, and whether its time is over;
+/// an error says what is wrong.
 pub fn check(name: &str, text: &str) -> miette::Result<CertificateKind> {
     let certificate = Certificate::from_toml(text).map_err(|e| miette::miette!("{name}: {e}"))?;
     let own_serial = certificate.instrument.serial.clone();
@@ -259,22 +244,14 @@ pub fn check(name: &str, text: &str) -> miette::Result<CertificateKind> {
     Ok(certificate.kind)
 }
 
-/// Verifies a certificate for an instrument, now.
-///
-/// # Errors
-/// Why it does not hold.
+/// Verifies a certificate for an instrument, now; an error says why it does not hold.
 pub fn verify<'a>(
     name: &str,
     certificate: &'a Certificate,
     kind: CertificateKind,
     serial: &str,
-) -> miette::Result<calibration::certificate::Verified<'a>> {
-    let at = calibration::certificate::Circumstances {
-        kind,
-        serial,
-        now_unix_s: now_unix_s()?,
-        temperature_c: None,
-    };
+) -> miette::Result<Verified<'a>> {
+    let at = Circumstances { kind, serial, now_unix_s: now_unix_s()?, temperature_c: None };
     certificate.verify(&at).map_err(|refusal| miette::miette!("{name}: {refusal}"))
 }
 

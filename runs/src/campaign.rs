@@ -137,10 +137,7 @@ pub fn text_of(name_or_path: &str) -> miette::Result<Option<(String, PathBuf)>> 
 }
 
 impl Campaign {
-    /// Parses and checks a campaign, its plan and its setups.
-    ///
-    /// # Errors
-    /// What is wrong, with the place in the file.
+    /// Parses and checks a campaign, its plan and its setups; a refusal has the place in the file.
     pub fn parse(origin: &str, text: &str, folder: &Path) -> miette::Result<Self> {
         let file: CampaignFile = input::parse_toml(origin, text)?;
         let mut wrong = Problems::of(origin, text);
@@ -159,17 +156,15 @@ impl Campaign {
             wrong.add(&["margin"], problem, None);
         }
         let mut names = BTreeSet::new();
-        for cell in &file.cell {
+        for Cell { name, .. } in &file.cell {
             let plain = |c: char| c.is_ascii_alphanumeric() || c == '-' || c == '_';
-            if cell.name.is_empty() || !cell.name.chars().all(plain) {
-                let problem = format!(
-                    "a cell's name '{}' has other characters than letters, digits, - and _",
-                    cell.name
-                );
+            if name.is_empty() || !name.chars().all(plain) {
+                let problem =
+                    format!("a cell's name '{name}' has other characters than letters, digits, - and _");
                 wrong.add(&["cell"], problem, None);
             }
-            if !names.insert(&cell.name) {
-                wrong.add(&["cell"], format!("two cells are named '{}'", cell.name), None);
+            if !names.insert(name) {
+                wrong.add(&["cell"], format!("two cells are named '{name}'"), None);
             }
         }
         wrong.end()?;

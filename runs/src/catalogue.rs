@@ -159,10 +159,7 @@ fn verdict_in(run: &Path) -> Option<String> {
     Some(document["text"].as_str()?.split(';').next()?.to_string())
 }
 
-/// The runs of a folder, newest first; none where the folder does not exist.
-///
-/// # Errors
-/// A folder that cannot be read.
+/// The runs of a folder, newest first; none where it does not exist, an error where it cannot be read.
 pub fn runs_in(folder: &Path) -> miette::Result<Vec<RunEntry>> {
     if !folder.exists() {
         return Ok(Vec::new());
@@ -179,37 +176,32 @@ pub fn runs_in(folder: &Path) -> miette::Result<Vec<RunEntry>> {
 
 /// Sorts entries by a column, empty ones last; entries that are alike stay in their order.
 pub fn sort(runs: &mut [RunEntry], by: SortBy) {
-    let text = |of: fn(&RunEntry) -> Option<String>| {
-        move |a: &RunEntry, b: &RunEntry| {
-            let [a, b] = [of(a), of(b)].map(|t| t.filter(|t| !t.is_empty()));
-            a.is_none().cmp(&b.is_none()).then(a.cmp(&b))
-        }
+    let mut by_text = |of: fn(&RunEntry) -> Option<String>| {
+        runs.sort_by_cached_key(|run| {
+            let text = of(run).filter(|text| !text.is_empty());
+            (text.is_none(), text)
+        });
     };
-    let number = |of: fn(&RunEntry) -> Option<f64>| {
-        move |a: &RunEntry, b: &RunEntry| of(a).unwrap_or(f64::MAX).total_cmp(&of(b).unwrap_or(f64::MAX))
-    };
+    let mu0 = |run: &RunEntry| run.mu0.unwrap_or(f64::MAX);
     match by {
         SortBy::Started => runs.sort_by(|a, b| b.started_unix_s.total_cmp(&a.started_unix_s)),
-        SortBy::Folder => runs.sort_by(text(|r| Some(r.folder.clone()))),
-        SortBy::Plan => runs.sort_by(text(|r| Some(r.plan.clone()))),
-        SortBy::Operator => runs.sort_by(text(|r| r.operator.clone())),
-        SortBy::Sample => runs.sort_by(text(|r| r.sample.clone())),
-        SortBy::Tip => runs.sort_by(text(|r| r.tip.clone())),
-        SortBy::Setup => runs.sort_by(text(|r| Some(r.setup.clone()))),
-        SortBy::Model => runs.sort_by(text(|r| Some(r.model.clone()))),
+        SortBy::Folder => by_text(|r| Some(r.folder.clone())),
+        SortBy::Plan => by_text(|r| Some(r.plan.clone())),
+        SortBy::Operator => by_text(|r| r.operator.clone()),
+        SortBy::Sample => by_text(|r| r.sample.clone()),
+        SortBy::Tip => by_text(|r| r.tip.clone()),
+        SortBy::Setup => by_text(|r| Some(r.setup.clone())),
+        SortBy::Model => by_text(|r| Some(r.model.clone())),
         SortBy::Seed => runs.sort_by_key(|r| r.seed.unwrap_or(u64::MAX)),
-        SortBy::Mu0 => runs.sort_by(number(|r| r.mu0)),
+        SortBy::Mu0 => runs.sort_by(|a, b| mu0(a).total_cmp(&mu0(b))),
         SortBy::Passes => runs.sort_by_key(|r| r.passes),
-        SortBy::Outcome => runs.sort_by(text(|r| Some(r.outcome_words()))),
-        SortBy::Verdict => runs.sort_by(text(|r| r.verdict.clone())),
-        SortBy::Tags => runs.sort_by(text(|r| Some(r.tags.join(" ")))),
+        SortBy::Outcome => by_text(|r| Some(r.outcome_words())),
+        SortBy::Verdict => by_text(|r| r.verdict.clone()),
+        SortBy::Tags => by_text(|r| Some(r.tags.join(" "))),
     }
 }
 
-/// The runs of a folder, newest first, at least one.
-///
-/// # Errors
-/// There is none; a folder that cannot be read.
+/// The runs of a folder, newest first; it is an error where there is none, or the folder cannot be read.
 pub fn existing(folder: &Path) -> miette::Result<Vec<RunEntry>> {
     let runs = runs_in(folder)?;
     if runs.is_empty() {

@@ -167,12 +167,9 @@ fn serial(file: &SetupFile, kind: CertificateKind) -> Result<Option<String>, Str
         | CertificateKind::Sensor => return Ok(None),
     };
     let known: Option<Vec<&str>> = stated.into_iter().map(|s| s.map(String::as_str)).collect();
-    match known {
-        Some(serials) => Ok(Some(serials.join("+"))),
-        None => Err(format!(
-            "the setup must state the `serial` of the instrument that the {kind} certificate is for"
-        )),
-    }
+    known.map(|serials| Some(serials.join("+"))).ok_or_else(|| {
+        format!("the setup must state the `serial` of the instrument that the {kind} certificate is for")
+    })
 }
 
 /// The setup's stated zero, or the one that was found with the certificate. Neither is silent: the first

@@ -83,13 +83,8 @@ impl Paired {
     /// The condition in words.
     pub fn setting(&self) -> String {
         let speed = self.speed_m_s * f64::from(self.direction);
-        let parts = [
-            (self.amplitude_pp_m, "m"),
-            (self.frequency_hz, "Hz"),
-            (speed, "m/s"),
-            (self.normal_force_n, "N"),
-        ];
-        parts.map(|(value, unit)| quantity(value, unit)).join(", ")
+        let [w, f] = [quantity(self.amplitude_pp_m, "m"), quantity(self.frequency_hz, "Hz")];
+        [w, f, quantity(speed, "m/s"), quantity(self.normal_force_n, "N")].join(", ")
     }
 
     /// The difference in standard deviations.
@@ -181,23 +176,17 @@ impl Judged {
     pub fn figures_words(&self, pairs: &[Paired]) -> [String; 2] {
         let ([low, high], conditions) = (self.shift_interval_95, pairs.len());
         let shift = format!("{:+.4}, 95 % interval {low:+.4} to {high:+.4}", self.shift);
-        let scatter = format!(
-            "chi2 {:.1} at {} degrees of freedom, {}",
-            self.scatter_chi2,
-            self.scatter_degrees,
-            p_value(self.scatter_p)
-        );
+        let (chi2, degrees) = (self.scatter_chi2, self.scatter_degrees);
+        let scatter = format!("chi2 {chi2:.1} at {degrees} degrees of freedom, {}", p_value(self.scatter_p));
+        let stated =
+            |p: &Paired| format!("{:+.3} +- {:.3} at {}", p.difference, p.difference_sd, p.setting());
         let by_difference = |a: &&Paired, b: &&Paired| a.difference.total_cmp(&b.difference);
         match (pairs.iter().min_by(by_difference), pairs.iter().max_by(by_difference)) {
             (Some(least), Some(most)) if self.varies() => [
                 format!(
-                    "the difference of mu' varies over {conditions} conditions, from {:+.3} +- {:.3} at {} to {:+.3} +- {:.3} at {} ({scatter})",
-                    least.difference,
-                    least.difference_sd,
-                    least.setting(),
-                    most.difference,
-                    most.difference_sd,
-                    most.setting()
+                    "the difference of mu' varies over {conditions} conditions, from {} to {} ({scatter})",
+                    stated(least),
+                    stated(most)
                 ),
                 format!("no single shift describes that: their weighted mean is {shift}"),
             ],
@@ -278,33 +267,33 @@ fn same(a: &Pass, b: &Pass) -> bool {
     a.direction == b.direction && settings(a).into_iter().zip(settings(b)).zip(SAME).all(near)
 }
 
-/// Passes of one condition, of the first and of the second run.
-type Group<'a> = [Vec<&'a Pass>; 2];
+/// The passes with vibration of some runs by their condition: its first pass, and the passes of each run.
+fn by_condition<'a>(sides: &[&Side<'a>]) -> Vec<(&'a Pass, Vec<Vec<&'a Pass>>)> {
+    let mut found: Vec<(&Pass, Vec<Vec<&Pass>>)> = Vec::new();
+    for (i, side) in sides.iter().enumerate() {
+        for pass in side.vibrating() {
+            let at = found.iter().position(|(first, _)| same(first, pass)).unwrap_or_else(|| {
+                found.push((pass, vec![Vec::new(); sides.len()]));
+                found.len() - 1
+            });
+            found[at].1[i].push(pass);
+        }
+    }
+    found
+}
 
 /// Pairs the passes of two runs and judges their differences; `None` where a run has no pass without vibration.
 pub fn compare(a: &Side<'_>, b: &Side<'_>) -> Option<Comparison> {
     let references = [a.reference()?, b.reference()?];
-    let mut groups: Vec<(&Pass, Group<'_>)> = Vec::new();
-    for (side, passes) in [a, b].into_iter().enumerate() {
-        for pass in passes.vibrating() {
-            match groups.iter_mut().find(|(first, _)| same(first, pass)) {
-                Some((_, group)) => group[side].push(pass),
-                None => {
-                    let mut group: Group<'_> = [Vec::new(), Vec::new()];
-                    group[side].push(pass);
-                    groups.push((pass, group));
-                }
-            }
-        }
-    }
     let (mut pairs, mut unpaired) = (Vec::new(), [0, 0]);
-    for (first, [of_a, of_b]) in groups {
+    for (first, of) in by_condition(&[a, b]) {
+        let (of_a, of_b) = (&of[0], &of[1]);
         if of_a.is_empty() || of_b.is_empty() {
             unpaired[0] += of_a.len();
             unpaired[1] += of_b.len();
             continue;
         }
-        let means = [a.mean(&of_a, references[0]), b.mean(&of_b, references[1])];
+        let means = [a.mean(of_a, references[0]), b.mean(of_b, references[1])];
         let shared = shared_variance(&references) * level(&means).powi(2);
         pairs.push(Paired {
             amplitude_pp_m: first.amplitude.metres(),

@@ -6,22 +6,19 @@ pub mod dynamics;
 mod lateness;
 mod spectra;
 
-use crate::plan::Point;
-use crate::plan::RenderPlan;
-use crate::run_dir::records_in;
+use crate::plan::{Point, RenderPlan};
+use crate::run_dir::{open_record, records_in};
 use crate::session::TARGET;
 use dynamics::{Dynamics, Part};
 pub use lateness::Late;
-use miette::{IntoDiagnostic, WrapErr};
+use miette::IntoDiagnostic;
 use models::target::Target;
 use realtime::cycle::{Command, Phase};
-use realtime::recorder::{self, Entry, Reader};
+use realtime::recorder::{self, Entry};
 use realtime::turn::Row;
 use serde::{Deserialize, Serialize};
 use spectra::Spectra;
 pub use spectra::{Bin, Corner};
-use std::fs::File;
-use std::io::BufReader;
 use std::path::Path;
 
 /// The file in a run's folder.
@@ -337,8 +334,7 @@ pub fn of_run(folder: &Path) -> miette::Result<Option<Fidelity>> {
     let mut found = Collector::default();
     let (mut stated, mut target, mut cycle_s) = (Stated::default(), None, 1e-3);
     for path in records_in(folder)? {
-        let file = File::open(&path).into_diagnostic().wrap_err_with(|| path.display().to_string())?;
-        for entry in Reader::new(BufReader::new(file)).only(recorder::CYCLES) {
+        for entry in open_record(&path, recorder::CYCLES)? {
             match entry {
                 Entry::File { name, bytes, .. } if name == TARGET => {
                     target = serde_json::from_slice::<Target>(&bytes).ok();
@@ -364,11 +360,7 @@ pub fn of_run(folder: &Path) -> miette::Result<Option<Fidelity>> {
         .filter(|fidelity| !fidelity.groups.is_empty()))
 }
 
-/// Makes the fidelity of a run again and writes it into the run's folder; `None` of a run that rendered
-/// nothing.
-///
-/// # Errors
-/// As [`of_run`], and whatever the file system says.
+/// The same, written into the run's folder; an error of the file system too.
 pub fn write(folder: &Path) -> miette::Result<Option<Fidelity>> {
     let found = of_run(folder)?;
     if let Some(fidelity) = &found {

@@ -1,6 +1,6 @@
 //! Files that outlive a power cut: written beside their place, synced, moved there, and their folder synced,
 //! because a name too is only safe once its folder is (POSIX `fsync`; ext4, XFS and Btrfs give more, none
-//! promises it). Errors are those of the file system, where no others are stated.
+//! promises it). Errors are those of the file system, with the file's name, where no others are stated.
 
 mod outputs;
 
@@ -25,7 +25,7 @@ pub fn beside(path: &Path) -> PathBuf {
 /// no other name. `options` must not truncate: what a link leads to would be empty before anybody looks.
 ///
 /// # Errors
-/// Whatever the file system says, or something else stands there.
+/// Something else stands there.
 pub fn open_plain(path: &Path, options: &mut OpenOptions) -> io::Result<File> {
     let file = options.custom_flags(libc::O_NOFOLLOW | libc::O_NONBLOCK).open(path)?;
     let found = file.metadata()?;
@@ -60,7 +60,7 @@ pub fn sync_folder_of(path: &Path) -> io::Result<()> {
 /// to as it is. A link of this user stays a link.
 ///
 /// # Errors
-/// Whatever the file system says, with the file's name; a link that another user has put there.
+/// A link that another user has put there.
 pub fn write_whole(path: &Path, bytes: impl AsRef<[u8]>) -> miette::Result<()> {
     let written = named(path).and_then(|path| {
         if fs::metadata(&path).is_ok_and(|there| !there.is_file() && !there.is_dir()) {
@@ -73,9 +73,6 @@ pub fn write_whole(path: &Path, bytes: impl AsRef<[u8]>) -> miette::Result<()> {
 
 /// Writes a file of a run's or a study's folder, to which others may write, in the same way; a link that
 /// stands there is replaced, and what it leads to is not touched.
-///
-/// # Errors
-/// Whatever the file system says, with the file's name.
 pub fn write_plain(path: &Path, bytes: impl AsRef<[u8]>) -> miette::Result<()> {
     put(path, bytes.as_ref()).into_diagnostic().wrap_err_with(|| format!("cannot write {}", path.display()))
 }
@@ -109,9 +106,6 @@ fn put(path: &Path, bytes: &[u8]) -> io::Result<()> {
 }
 
 /// Makes a folder with all that lead to it, their names safe. Returns those that were not there, the outermost first.
-///
-/// # Errors
-/// Whatever the file system says, with the folder's name.
 pub fn make_folder(path: &Path) -> miette::Result<Vec<PathBuf>> {
     let wrong = || format!("cannot make {}", path.display());
     let missing = path.ancestors().filter(|p| !p.as_os_str().is_empty() && !p.exists());
@@ -134,17 +128,11 @@ pub struct Placed {
 
 impl Placed {
     /// Opens a file as [`open_plain`] does; the name of a new one is safe when this returns.
-    ///
-    /// # Errors
-    /// Whatever the file system says, with the file's name.
     pub fn open(path: &Path, options: &mut OpenOptions) -> miette::Result<Self> {
         Self::of(path, || open_plain(path, options))
     }
 
     /// A new file, as [`fresh`] makes it.
-    ///
-    /// # Errors
-    /// Whatever the file system says, with the file's name.
     pub fn fresh(path: &Path) -> miette::Result<Self> {
         Self::of(path, || fresh(path))
     }
@@ -168,9 +156,6 @@ impl Placed {
     }
 
     /// Another handle of the same open file.
-    ///
-    /// # Errors
-    /// Whatever the system says.
     pub fn handle(&self) -> miette::Result<Placed> {
         Ok(Placed { file: self.file.try_clone().into_diagnostic()?, path: self.path.clone() })
     }

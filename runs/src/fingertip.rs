@@ -146,16 +146,11 @@ impl Fingertip {
         };
         let file = FingertipFile::read(&setup.tip, &text)
             .map_err(|e| format!("fingertip '{}'{}", setup.tip, e.after_its_name()))?;
-        let finger = Finger {
-            normal_stiffness_n_per_m: setup
-                .normal_stiffness_n_per_m
-                .unwrap_or(file.finger.normal_stiffness_n_per_m),
-            lateral_stiffness_n_per_m: setup
-                .lateral_stiffness_n_per_m
-                .unwrap_or(file.finger.lateral_stiffness_n_per_m),
-            stiffness_relative_sd: setup.stiffness_relative_sd.unwrap_or(file.finger.stiffness_relative_sd),
-            ..file.finger
-        };
+        let mut finger = file.finger;
+        let set = |slot: &mut f64, stated: Option<f64>| *slot = stated.unwrap_or(*slot);
+        set(&mut finger.normal_stiffness_n_per_m, setup.normal_stiffness_n_per_m);
+        set(&mut finger.lateral_stiffness_n_per_m, setup.lateral_stiffness_n_per_m);
+        set(&mut finger.stiffness_relative_sd, setup.stiffness_relative_sd);
         usable(&finger).map_err(|(_, problem)| format!("fingertip '{}': {problem}", setup.tip))?;
         let mu0 = setup.mu0.unwrap_or(file.mu0);
         if !(mu0.is_finite() && mu0 > 0.0) {

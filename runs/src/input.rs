@@ -1,5 +1,6 @@
 //! Reading files that people wrote: every refusal shows the place in the file and what would do.
 
+use crate::report::human::rounded;
 use miette::{Diagnostic, NamedSource, SourceSpan};
 use models::rig_file::{RigFile, RigFileError};
 use serde::de::DeserializeOwned;
@@ -93,11 +94,6 @@ impl<'a> Problems<'a> {
         self.all.push(BadInput { problem, remedy: remedy.into(), text, place });
     }
 
-    /// The value, or one problem more.
-    pub fn keep<T>(&mut self, path: &[&str], value: Result<T, String>) -> Option<T> {
-        value.map_err(|problem| self.add(path, problem, None)).ok()
-    }
-
     /// Whether there is none so far.
     pub fn is_empty(&self) -> bool {
         self.all.is_empty()
@@ -160,15 +156,8 @@ pub fn unit_meant(key: &str, value: f64, [low, high]: [f64; 2]) -> Option<String
         _ => format!("{prefix}{unit}"),
     };
     let shown = meant.replace('u', "\u{b5}");
-    Some(format!(
-        "{value} {unit}: {shown} meant? Then write {:e}, or \"{value}{meant}\"",
-        round(value * factor)
-    ))
-}
-
-/// Without the last digits, which only the arithmetic brings in.
-fn round(value: f64) -> f64 {
-    format!("{value:.11e}").parse().unwrap_or(value)
+    let si = rounded(value * factor, 11);
+    Some(format!("{value} {unit}: {shown} meant? Then write {si:e}, or \"{value}{meant}\""))
 }
 
 /// What TOML's reader says, in words for people: no types of the program.
@@ -181,24 +170,16 @@ fn in_words(message: &str) -> String {
         (&["a sequence"], "a list in [brackets]"),
         (&["a map"], "a table"),
     ];
-    let Some((found, expected)) = message.split_once(", expected ") else {
+    let invalid = message.strip_prefix("invalid ").and_then(|rest| rest.split_once(", expected "));
+    let Some((found, expected)) = invalid.filter(|(found, _)| !found.contains("length")) else {
         return message
             .replace("key with no value, expected `=`", "this is not a 'key = value' (is it a TOML file?)");
     };
     let words = TYPES.iter().find(|(names, _)| names.contains(&expected)).map(|(_, words)| *words);
-    let words = words.map(str::to_string).unwrap_or_else(|| match expected.strip_prefix("struct ") {
-        Some(_) => "a table".to_string(),
-        None => expected.to_string(),
-    });
-    let found = found.trim_start_matches("invalid type: ").trim_start_matches("invalid value: ");
-    if message.starts_with("invalid ") && !found.contains("length") {
-        format!(
-            "{} was found, {words} is expected",
-            found.replace("floating point", "number").replace("string", "text")
-        )
-    } else {
-        message.replace("key with no value, expected `=`", "this is not a 'key = value' (is it a TOML file?)")
-    }
+    let words = words.unwrap_or(if expected.starts_with("struct ") { "a table" } else { expected });
+    let found = found.trim_start_matches("type: ").trim_start_matches("value: ");
+    let found = found.replace("floating point", "number").replace("string", "text");
+    format!("{found} was found, {words} is expected")
 }
 
 /// The largest file that is read as configuration.
@@ -335,9 +316,6 @@ pub fn rig_file(path: &Path) -> miette::Result<RigFile> {
 }
 
 /// The same from the text of the file called `name`.
-///
-/// # Errors
-/// As [`rig_file`].
 pub fn rig_text(name: &str, text: &str) -> miette::Result<RigFile> {
     let file: RigFile = parse_toml(name, text)?;
     let mut wrong = Problems::of(name, text);

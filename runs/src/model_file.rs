@@ -50,7 +50,7 @@ pub fn load_for(setup: &Setup, name: &str, text: &str) -> miette::Result<Arc<dyn
         return law(finger, name, text);
     }
     let model = compiled(finger, name, text)?;
-    if let Some(lack) = model.lacks(&setup.ambient()) {
+    if let Some(lack) = model.lacks(&setup.file.stated_air()) {
         miette::bail!(
             help = format!("state `{}` in the setup, as read at the bench", lack.covariate.name),
             "{name}: {lack}; the setup {} states none, and without it the law would do nothing",
@@ -60,10 +60,7 @@ pub fn load_for(setup: &Setup, name: &str, text: &str) -> miette::Result<Arc<dyn
     Ok(Arc::new(model))
 }
 
-/// The law of a file for a finger. Its name is that of the file.
-///
-/// # Errors
-/// As [`load`].
+/// The law of a file for a finger, with the errors of [`load`]. Its name is that of the file.
 pub fn law(finger: &Finger, name: &str, text: &str) -> miette::Result<Arc<dyn FrictionModel>> {
     let stem = Path::new(name).file_stem().map_or(name.into(), |s| s.to_string_lossy());
     let refused = |why: String| miette::miette!("{name}: {why}");

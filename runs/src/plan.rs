@@ -9,9 +9,8 @@
 //! shuffled within each state of the air, with passes without vibration between them. `points` makes the
 //! passes, `reach` checks what the instruments can do, `visible` what the sensors can see, `render` a wanted
 //! friction, `follow` how a force is held. Every point is checked before anything moves. `PassTimes` are the
-//! only times of a pass that a plan sets.
+//! only times of a pass that a plan sets. A refusal says what is wrong, with the place in the file.
 
-mod bundled;
 mod follow;
 mod points;
 mod reach;
@@ -19,20 +18,28 @@ mod render;
 mod steps;
 mod visible;
 
-use crate::input::{self, Problems};
+use crate::input::{self, BadInput, Problems};
 use models::condition::Condition;
 use models::covariate::{self, Covariate};
 use models::quantity::PeakToPeak;
 use serde::{Deserialize, Serialize};
 use std::collections::BTreeMap;
 
-pub use bundled::BUNDLED;
 pub(crate) use points::series_place;
-pub use points::{PlanProblem, Point, Resolution};
+pub use points::{Point, Resolution};
 pub use reach::{Reach, times};
 pub use render::{Control, RenderPlan, TargetKind};
 pub use steps::{Action, Step, When};
 pub use visible::{COUNTS_MIN, LateralChannel};
+
+/// Name and text of every bundled plan. Add one: a file in `runs/plans/` and a line here.
+pub const BUNDLED: &[(&str, &str)] = &[
+    ("first-sweep", include_str!("../plans/first-sweep.toml")),
+    ("fig9-artificial", include_str!("../plans/fig9-artificial.toml")),
+    ("part2-validation", include_str!("../plans/part2-validation.toml")),
+    ("render-grating", include_str!("../plans/render-grating.toml")),
+    ("psi-reading", include_str!("../plans/psi-reading.toml")),
+];
 
 /// A plan file.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize, schemars::JsonSchema)]
@@ -258,17 +265,11 @@ pub struct Plan {
 
 impl Plan {
     /// The bundled plan of that name, or the file at that path.
-    ///
-    /// # Errors
-    /// What is wrong, with the place in the file.
     pub fn load(name_or_path: &str) -> miette::Result<Self> {
         Self::parse(name_or_path, &crate::bundled::load("plan", BUNDLED, name_or_path)?.0)
     }
 
     /// Parses and checks a plan by itself. Against limits it is checked by [`Plan::points`].
-    ///
-    /// # Errors
-    /// What is wrong, with the place in the file.
     pub fn parse(origin: &str, text: &str) -> miette::Result<Self> {
         let file: PlanFile = input::parse_toml(origin, text)?;
         let mut wrong = Problems::of(origin, text);
@@ -337,6 +338,11 @@ impl Plan {
         file.step.iter().for_each(|step| step.check(&mut wrong));
         wrong.end()?;
         Ok(Plan { file, text: text.to_string(), origin: origin.to_string() })
+    }
+
+    /// A refusal of the plan, at the value of a key.
+    fn refused(&self, path: &[&str], problem: String, remedy: String) -> BadInput {
+        BadInput::new(&self.origin, &self.text, input::place_of(&self.text, path), problem, remedy)
     }
 
     /// What `[protocol]` states; what is left empty states nothing.

@@ -49,19 +49,20 @@ pub fn remark(text: &str) {
 
 /// Writes to standard error without a line end: the form behind [`ask!`]. While that is held, the text waits.
 pub fn question(text: &str) {
-    if let Some(held) = &mut *HELD.lock().unwrap_or_else(PoisonError::into_inner) {
-        return held.keep(text);
-    }
-    // Not under that lock: a terminal that takes nothing holds up who writes, and nobody else.
-    put(ERR, Piece::Text(text.into()), false);
+    on_error(text.into(), false);
 }
 
 /// A line on standard error that is written before all that waits there.
 pub fn urgent(text: &str) {
-    if let Some(held) = &mut *HELD.lock().unwrap_or_else(PoisonError::into_inner) {
-        return held.keep(&format!("{text}\n"));
+    on_error(format!("{text}\n"), true);
+}
+
+fn on_error(text: String, first: bool) {
+    if let Some(held) = &mut *held() {
+        return held.keep(text);
     }
-    put(ERR, Piece::Text(format!("{text}\n")), true);
+    // Not under that lock: a terminal that takes nothing holds up who writes, and nobody else.
+    put(ERR, Piece::Text(text), first);
 }
 
 /// Draws something on standard error, such as a bar, where remarks are written; `line` is the line that it
@@ -174,10 +175,8 @@ fn put(output: usize, piece: Piece, first: bool) {
     piece.write(output);
 }
 
-/// From now on nobody waits for a reader of the output; a panic's message goes the same way.
-///
-/// # Errors
-/// The system gives no thread.
+/// From now on nobody waits for a reader of the output; a panic's message goes the same way. It is an error
+/// where the system gives no thread.
 pub fn beside() -> io::Result<()> {
     // A second run of this process goes on with the threads of the first.
     let had = outlets().is_some();
@@ -250,6 +249,10 @@ const LAST: usize = 900;
 /// Output to standard error while a picture has the terminal.
 static HELD: Mutex<Option<Held>> = Mutex::new(None);
 
+fn held() -> MutexGuard<'static, Option<Held>> {
+    HELD.lock().unwrap_or_else(PoisonError::into_inner)
+}
+
 /// Remarks that wait.
 #[derive(Debug, Default)]
 struct Held {
@@ -259,15 +262,15 @@ struct Held {
 }
 
 impl Held {
-    fn keep(&mut self, text: &str) {
+    fn keep(&mut self, text: String) {
         if self.first.len() < FIRST {
-            return self.first.push(text.into());
+            return self.first.push(text);
         }
         if self.last.len() == LAST {
             self.last.pop_front();
             self.lost += 1;
         }
-        self.last.push_back(text.into());
+        self.last.push_back(text);
     }
 
     fn all(self) -> Vec<String> {
@@ -278,12 +281,12 @@ impl Held {
 
 /// Holds the output to standard error from now on: a picture has the terminal.
 pub fn hold() {
-    HELD.lock().unwrap_or_else(PoisonError::into_inner).get_or_insert_default();
+    held().get_or_insert_default();
 }
 
 /// Holds nothing any more; returns what was held.
 pub fn release() -> Vec<String> {
-    HELD.lock().unwrap_or_else(PoisonError::into_inner).take().map(Held::all).unwrap_or_default()
+    held().take().map(Held::all).unwrap_or_default()
 }
 
 fn whole(to: &mut impl Write, text: &str) {
@@ -422,7 +425,7 @@ mod tests {
     fn what_is_held_is_bounded_and_says_what_it_lost() {
         let mut held = Held::default();
         for n in 0..FIRST + LAST + 7 {
-            held.keep(&format!("{n}\n"));
+            held.keep(format!("{n}\n"));
         }
         let all = held.all();
         assert_eq!(all.len(), FIRST + 1 + LAST);

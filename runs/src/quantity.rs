@@ -6,10 +6,8 @@ const PREFIXES: [(&str, i32); 9] =
 /// The power of ten that `written`, such as `mm/s`, has over the SI unit, such as `m/s`.
 fn power(written: &str, unit: &str) -> Option<i32> {
     let one = |written: &str, unit: &str| {
-        PREFIXES
-            .iter()
-            .find(|(prefix, _)| written.strip_prefix(prefix) == Some(unit))
-            .map(|(_, power)| *power)
+        let fits = |(prefix, _): &&(&str, i32)| written.strip_prefix(prefix) == Some(unit);
+        PREFIXES.iter().find(fits).map(|(_, power)| *power)
     };
     match (written.split_once('/'), unit.split_once('/')) {
         (Some((above, below)), Some((of, per))) => Some(one(above, of)? - one(below, per)?),

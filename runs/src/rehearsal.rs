@@ -12,10 +12,7 @@ use sim::wire::world::WorldPlant;
 use sim::world::{World, WorldConfig};
 use std::path::Path;
 
-/// Rehearses the profile in a file.
-///
-/// # Errors
-/// What is wrong with it, with the place where it is known.
+/// Rehearses the profile in a file; an error says what is wrong with it, with the place where it is known.
 pub fn of(path: &Path) -> Result<(), String> {
     let profile =
         Source::read(path).and_then(|source| source.profile()).map_err(|error| error.to_string())?;

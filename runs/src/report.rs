@@ -1,5 +1,6 @@
 //! The report of a run: one self-contained HTML page. Nothing comes from elsewhere, and without JavaScript it
-//! says the same. An error of a part of a page is one of the drawing library, unless it states another.
+//! says the same. An error of a page is a folder that holds no run; one of a part of a page comes from the
+//! drawing library, unless it states another.
 //!
 //! | module | part of a page |
 //! |---|---|
@@ -23,15 +24,12 @@ pub mod plots;
 pub mod published;
 pub mod traces;
 
-use crate::run_dir::{differences, missing_records, of_file, passes_in, records_in};
+use crate::run_dir::{differences, missing_records, of_file, open_record, passes_in, records_in};
 use crate::sequence::MeasuredPass;
 use crate::session::Summary;
-use miette::{IntoDiagnostic, WrapErr};
 use models::finger::Finger;
-use realtime::recorder::{self, Entry, Reader};
+use realtime::recorder::{self, Entry};
 use std::collections::BTreeMap;
-use std::fs::File;
-use std::io::BufReader;
 use std::path::Path;
 
 pub use explore::{EXPLORE, FIGURES, UPLOT, UPLOT_STYLE};
@@ -67,9 +65,6 @@ impl RunData {
 }
 
 /// Reads a run's folder.
-///
-/// # Errors
-/// A folder that holds no run.
 pub fn read(folder: &Path) -> miette::Result<RunData> {
     let passes = passes_in(folder)?;
     let mut facts = BTreeMap::new();
@@ -77,10 +72,9 @@ pub fn read(folder: &Path) -> miette::Result<RunData> {
     let mut events = Vec::new();
     let mut damage = missing_records(folder)?;
     for path in records_in(folder)? {
-        let file = File::open(&path).into_diagnostic().wrap_err_with(|| path.display().to_string())?;
         let mut start = 0u64;
         // Entry by entry: the rows of hours would not fit into memory.
-        let mut reader = Reader::new(BufReader::new(file)).only(recorder::EVENTS);
+        let mut reader = open_record(&path, recorder::EVENTS)?;
         for entry in &mut reader {
             match entry {
                 Entry::Facts { name, facts: found } if name == recorder::HEADER => {
@@ -108,17 +102,11 @@ pub fn read(folder: &Path) -> miette::Result<RunData> {
 }
 
 /// The report of a run as HTML.
-///
-/// # Errors
-/// A folder that holds no run.
 pub fn html(folder: &Path) -> miette::Result<String> {
     Ok(html_and_damage(folder, &[])?.0)
 }
 
 /// The same with published values on its axes, and what is damaged or missing in the folder.
-///
-/// # Errors
-/// A folder that holds no run.
 pub fn html_and_damage(
     folder: &Path,
     overlay: &[published::Published],

@@ -19,11 +19,12 @@ use lines::{whole_passes, whole_table};
 pub use lock::{claim, holder, is_held};
 use miette::{Context, IntoDiagnostic};
 use models::pass::{self, Pass};
+use realtime::recorder::Reader;
 pub use record_facts::{RecordFacts, header_facts, record_facts};
 use serde::{Deserialize, Serialize};
 use std::collections::BTreeMap;
 use std::fs::{self, File, OpenOptions};
-use std::io::Write;
+use std::io::{BufReader, Write};
 use std::path::{Path, PathBuf};
 
 /// What a run is of: written when it begins, compared when it is taken up again.
@@ -291,14 +292,16 @@ impl RunDir {
     }
 }
 
+/// A reader of one topic of a record file.
+pub(crate) fn open_record(path: &Path, topic: &'static str) -> miette::Result<Reader<BufReader<File>>> {
+    let file = File::open(path).into_diagnostic().wrap_err_with(|| path.display().to_string())?;
+    Ok(Reader::new(BufReader::new(file)).only(topic))
+}
+
 /// The record files of a run's folder, oldest first.
 pub fn records_in(path: &Path) -> miette::Result<Vec<PathBuf>> {
-    let mut found: Vec<PathBuf> = fs::read_dir(path)
-        .into_diagnostic()
-        .wrap_err_with(|| path.display().to_string())?
-        .filter_map(|entry| entry.ok().map(|e| e.path()))
-        .filter(|p| is_record(p))
-        .collect();
+    let entries = fs::read_dir(path).into_diagnostic().wrap_err_with(|| path.display().to_string())?;
+    let mut found: Vec<PathBuf> = entries.flatten().map(|e| e.path()).filter(|p| is_record(p)).collect();
     found.sort_by_key(|p| (p.as_os_str().len(), p.clone()));
     Ok(found)
 }
@@ -312,9 +315,6 @@ pub(crate) fn is_record(path: &Path) -> bool {
 }
 
 /// What the run in a folder is of.
-///
-/// # Errors
-/// A file that cannot be read, or holds something else.
 pub fn identity_in(path: &Path) -> miette::Result<Identity> {
     let file = path.join(IDENTITY);
     toml::from_str(&crate::input::text_of(&file)?).map_err(|e| miette::miette!("{}: {e}", file.display()))
@@ -326,9 +326,6 @@ pub fn has_begun(path: &Path) -> bool {
 }
 
 /// The sessions of a run's folder, oldest first; none where the first has not begun.
-///
-/// # Errors
-/// A file that cannot be read.
 pub fn sessions_in(path: &Path) -> miette::Result<Vec<Session>> {
     let file = path.join(SESSIONS);
     if !file.exists() {

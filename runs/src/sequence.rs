@@ -52,33 +52,18 @@ pub struct Reaction {
     pub question: Option<Question>,
 }
 
+/// Where the sweep is, and since when; of a zero whether it comes after the passes, of a pause when the rig
+/// was last seen off, at rest and lifted off (`quiet`), of edges how many requests were sent.
 #[derive(Clone, Copy, Debug, PartialEq)]
 enum Stage {
     Arm,
     AtRig,
-    Zero {
-        since: Option<Nanos>,
-        after: bool,
-    },
-    /// Since when, and when the rig was last seen off, at rest and lifted off.
-    Paused {
-        since: Nanos,
-        quiet: Nanos,
-    },
-    Approach {
-        since: Nanos,
-    },
-    Settle {
-        since: Nanos,
-    },
-    Measure {
-        since: Nanos,
-    },
-    /// Since when, and how many requests were sent.
-    Edges {
-        since: Nanos,
-        sent: u32,
-    },
+    Zero { since: Option<Nanos>, after: bool },
+    Paused { since: Nanos, quiet: Nanos },
+    Approach { since: Nanos },
+    Settle { since: Nanos },
+    Measure { since: Nanos },
+    Edges { since: Nanos, sent: u32 },
     Over,
 }
 
@@ -150,8 +135,6 @@ pub struct Sequence {
     has_watchdog: bool,
     guards: Guards,
     exposure_left: Option<Left>,
-    /// How each arming begins.
-    unarmed: Arming,
     load_commanded: bool,
     pause_max: Nanos,
     /// The stop of a pause is on its way: the trip that shows it ends nothing.
@@ -195,7 +178,6 @@ impl Sequence {
             has_watchdog: true,
             guards: Guards::default(),
             exposure_left: None,
-            unarmed: Arming::new(),
             load_commanded: true,
             pause_max: Nanos::from_seconds(PAUSE_MAX_S),
             pausing: false,
@@ -226,7 +208,6 @@ impl Sequence {
         Sequence {
             has_watchdog: limits.amplifier_watchdog || limits.supply_watchdog,
             arming: self.arming.guarded_by(limits),
-            unarmed: self.unarmed.guarded_by(limits),
             load_commanded: limits.load_commanded,
             approach: Approach::at(limits.timing.cycle, &limits.timing.stage),
             ..self
@@ -303,7 +284,7 @@ impl Sequence {
             return out;
         }
         // The stop before a person comes to the rig is the sweep's own.
-        let own = stopped && self.stage == Stage::AtRig && self.at_rig.is_disarmed();
+        let own = stopped && self.stage == Stage::AtRig && self.at_rig.disarmed;
         if let Some(trip) = row.tripped.filter(|_| !own && (stopped || self.stage != Stage::Arm)) {
             out.events.push(Event::Tripped(trip));
             self.finish(&mut out, if stopped { Outcome::Stopped } else { Outcome::Tripped(trip) });
@@ -366,7 +347,7 @@ impl Sequence {
         let seen = &row.inputs.seen;
         out.events.push(Event::Armed);
         // A virtual rig has no mains that a person could cut.
-        if seen.supply == Err(NoData::NotFitted) && !self.at_rig.is_simulated() {
+        if seen.supply == Err(NoData::NotFitted) && !self.at_rig.simulated {
             out.events.push(Event::NoSecondChannel);
         }
         if !self.has_watchdog {
@@ -475,7 +456,7 @@ impl Sequence {
             self.finish(out, Outcome::Stopped);
         } else if !self.paused && !row.armed {
             out.events.push(Event::Resumed);
-            self.arming = self.unarmed;
+            self.arming = self.arming.afresh(false);
             self.stage = Stage::Arm;
         }
     }

@@ -252,10 +252,8 @@ impl Begun {
 impl Job {
     /// What the run is of.
     pub fn identity(&self) -> Identity {
-        let model = self
-            .model_file
-            .as_ref()
-            .map_or_else(|| self.model.name().to_string(), |(_, text)| sha256_hex(text.as_bytes()));
+        let file = self.model_file.as_ref().map(|(_, text)| sha256_hex(text.as_bytes()));
+        let model = file.unwrap_or_else(|| self.model.name().to_string());
         Identity {
             plan: self.plan.file.name.clone(),
             setup: self.setup.file.name.clone(),
@@ -307,10 +305,7 @@ impl Job {
         Ok(Some((target, remarks)))
     }
 
-    /// What the plan states of its rendering, and what is known of the rig.
-    ///
-    /// # Errors
-    /// As [`Job::points`].
+    /// What the plan states of its rendering, and what is known of the rig. Errors: those of [`Job::points`].
     pub fn stated(&self) -> miette::Result<Stated> {
         let points = self.plan.points(self.seed, &self.setup.config.limits, &self.resolution()?)?;
         let remarks = self.followed(&points)?.map(|(_, remarks)| remarks).unwrap_or_default();
@@ -358,7 +353,7 @@ impl Job {
             self.setup.file.noise,
         )
         .watching(&self.setup.certificates.temperature_ranges)
-        .in_air(self.setup.ambient())
+        .in_air(self.setup.file.stated_air())
         .at_rig(&self.plan, &self.setup)
         .guarded_by(&self.setup.config.limits)
         .on_rig(self.setup.guards(), self.setup.file.limits.pause_max_s.unwrap_or(PAUSE_MAX_S))
@@ -399,15 +394,12 @@ impl Job {
         fast::run(self, begun, signals, update)
     }
 
-    /// The world of the virtual rig.
-    ///
-    /// # Errors
-    /// What a world cannot be.
+    /// The world of the virtual rig; an error says why it cannot be.
     pub fn world(&self) -> miette::Result<sim::world::World> {
         let virtual_rig = self.setup.file.virtual_rig.clone().unwrap_or_default();
         let mut config = virtual_rig.world();
         // What the setup states of the air is so in its world.
-        let (air, room) = (self.setup.ambient(), &mut config.room);
+        let (air, room) = (self.setup.file.stated_air(), &mut config.room);
         room.ambient_pressure_pa = air.ambient_pressure_pa.unwrap_or(room.ambient_pressure_pa);
         room.temperature_c = air.temperature_c.unwrap_or(room.temperature_c);
         room.relative_humidity_pct = air.relative_humidity_pct.unwrap_or(room.relative_humidity_pct);
@@ -427,8 +419,7 @@ impl Job {
         config.finger.stiffness_relative_sd = 0.0;
         let mut world = sim::world::World::new(&config, self.seed).map_err(wrong)?;
         if virtual_rig.hand_holds {
-            let holds_dead_man_from = Some(realtime::ports::Nanos(200_000_000));
-            world.set_operator(sim::world::Operator { holds_dead_man_from, ..world.operator() });
+            world.operator.holds_dead_man_from = Some(realtime::ports::Nanos(200_000_000));
         }
         Ok(world)
     }

@@ -3,8 +3,8 @@
 //! `SetupFile` is what is written, `Setup` what was checked: profiles found (`profiles`), limits below the
 //! hard limits (`limits`), and the guards that the fingertip needs (`guards`). A setup has either addresses
 //! of instruments or a virtual rig. Only the clock of the latter may be held while the computer is stalled.
+//! A refusal says what is wrong, with the place in the file; else an error is a profile that cannot be used.
 
-mod bundled;
 mod guards;
 mod limits;
 mod profiles;
@@ -26,9 +26,19 @@ use realtime::safety::Exposed;
 use serde::{Deserialize, Serialize};
 use std::path::{Path, PathBuf};
 
-pub use bundled::BUNDLED;
 pub use limits::LimitsFile;
 pub use profiles::{library, look_in};
+
+/// Name and text of every bundled setup. Add one: a file in `runs/setups/` and a line here.
+pub const BUNDLED: &[(&str, &str)] = &[
+    ("virtual", include_str!("../setups/virtual.toml")),
+    ("virtual-ideal", include_str!("../setups/virtual-ideal.toml")),
+    ("virtual-mixed", include_str!("../setups/virtual-mixed.toml")),
+    ("virtual-relay", include_str!("../setups/virtual-relay.toml")),
+    ("virtual-rtu", include_str!("../setups/virtual-rtu.toml")),
+    ("virtual-slcan", include_str!("../setups/virtual-slcan.toml")),
+    ("virtual-socketcan", include_str!("../setups/virtual-socketcan.toml")),
+];
 
 /// What to do about an amplifier that shows no temperature.
 pub const THERMOMETER: &str =
@@ -101,7 +111,7 @@ pub struct SetupFile {
 
 impl SetupFile {
     /// What the setup states of the air.
-    fn stated_ambient(&self) -> Ambient {
+    pub fn stated_air(&self) -> Ambient {
         Ambient {
             ambient_pressure_pa: self.ambient_pressure_pa,
             temperature_c: self.temperature_c,
@@ -231,18 +241,12 @@ pub struct Setup {
 
 impl Setup {
     /// The bundled setup of that name, or the file at that path.
-    ///
-    /// # Errors
-    /// What is wrong, with the place in the file.
     pub fn load(name_or_path: &str) -> miette::Result<Self> {
         let (text, folder) = crate::bundled::load("setup", BUNDLED, name_or_path)?;
         Self::parse(name_or_path, &text, folder)
     }
 
     /// Parses and checks a setup.
-    ///
-    /// # Errors
-    /// What is wrong, with the place in the file.
     pub fn parse(origin: &str, text: &str, folder: &Path) -> miette::Result<Self> {
         let mut file: SetupFile = input::parse_toml(origin, text)?;
         file.pace.keep_cpus_awake.get_or_insert(file.virtual_rig.is_none());
@@ -283,7 +287,7 @@ impl Setup {
         {
             wrong.add(&["virtual", "ridge_table_strokes"], problem.to_string(), None);
         }
-        let air = models::condition::Condition::paper().within(&file.stated_ambient());
+        let air = models::condition::Condition::paper().within(&file.stated_air());
         for c in covariate::OPTIONAL {
             if let Some(value) = c.of(&air).filter(|v| !c.admits(*v)) {
                 let remedy = unit_meant(c.name, value, c.range);
@@ -313,7 +317,9 @@ impl Setup {
         let now_unix_s = std::time::SystemTime::now()
             .duration_since(std::time::UNIX_EPOCH)
             .map_or(0, |since| since.as_secs() as i64);
-        let certificates = wrong.keep(&["certificates"], Certificates::load(&file, folder, now_unix_s));
+        let certificates = Certificates::load(&file, folder, now_unix_s)
+            .map_err(|problem| wrong.add(&["certificates"], problem, None))
+            .ok();
         wrong.end()?;
         let (Some(tip), Some(limits), Some(certificates)) = (tip, limits, certificates) else {
             miette::bail!("{origin}: a part is missing, and nothing says which");
@@ -338,11 +344,6 @@ impl Setup {
         Ok(setup)
     }
 
-    /// What the setup states of the air.
-    pub fn ambient(&self) -> Ambient {
-        self.file.stated_ambient()
-    }
-
     /// Whether a key that is held at the terminal stands for the dead-man device: the setup says so, and none is wired.
     pub fn hand_at_key(&self) -> bool {
         let limits = &self.config.limits;
@@ -360,19 +361,12 @@ impl Setup {
 
     /// The instruments' part, for the drivers.
     pub fn instruments(&self) -> InstrumentsSetup {
-        let mut amplifier = self.file.amplifier.clone();
+        let SetupFile { force, mut amplifier, stage, supply_relay, safety_inputs, chamber, .. } =
+            self.file.clone();
         // A certificate of the drive's current is what the setup would otherwise have to state.
         amplifier.amplitude_m_per_unit =
             self.certificates.amplitude_m_per_unit.or(amplifier.amplitude_m_per_unit);
-        let SetupFile { force, stage, supply_relay, safety_inputs, chamber, .. } = &self.file;
-        InstrumentsSetup {
-            force: force.clone(),
-            amplifier,
-            stage: stage.clone(),
-            supply_relay: supply_relay.clone(),
-            safety_inputs: safety_inputs.clone(),
-            chamber: chamber.clone(),
-        }
+        InstrumentsSetup { force, amplifier, stage, supply_relay, safety_inputs, chamber }
     }
 
     /// -3 dB bandwidth of the lateral channel's filter in Hz, where its profile states one.
@@ -385,9 +379,6 @@ impl Setup {
     }
 
     /// What reads the lateral force, by profile, setup and certificate; `None` where no instrument does.
-    ///
-    /// # Errors
-    /// A profile that cannot be used.
     pub fn lateral_channel(&self) -> miette::Result<Option<LateralChannel>> {
         for instrument in &self.file.force {
             let profile = instrument.description().map_err(|e| miette::miette!("{e}"))?;
@@ -414,9 +405,6 @@ impl Setup {
     }
 
     /// What its instruments take and see, by their profiles and this setup.
-    ///
-    /// # Errors
-    /// A profile that cannot be used.
     pub fn reaches(&self) -> miette::Result<Vec<Reach>> {
         let instruments = self.instruments();
         let described = |i: &drivers::InstrumentSetup| i.description().map_err(|e| miette::miette!("{e}"));

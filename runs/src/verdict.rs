@@ -75,13 +75,11 @@ pub fn plan(experiment: &diagnosis::next::Experiment) -> String {
     let of = |c: &Condition, k: &Covariate| k.of(c).map(|v| (k.name, v));
     let listed = |k: &&Covariate| k.name != covariate::DIRECTION.name;
     let mut text = format!(
-        "# Written by muprime diagnose.\nname = \"next-experiment\"\nabout = {about}\nrandomise = false\n\n[base]\n{}",
-        covariate::planned()
-            .filter(|k| listed(k) && based(k))
-            .filter_map(|k| of(base, k))
-            .map(|(name, value)| format!("{name} = {value:e}\n"))
-            .collect::<String>()
+        "# Written by muprime diagnose.\nname = \"next-experiment\"\nabout = {about}\nrandomise = false\n\n[base]\n"
     );
+    for (name, value) in covariate::planned().filter(|k| listed(k) && based(k)).filter_map(|k| of(base, k)) {
+        text.push_str(&format!("{name} = {value:e}\n"));
+    }
     for (c, number) in conditions.iter().zip(1..) {
         let direction = i8::from(c.direction);
         text.push_str(&format!("\n[[series]]\nname = \"pass {number}\"\ndirections = [{direction}]\n"));
@@ -90,6 +88,11 @@ pub fn plan(experiment: &diagnosis::next::Experiment) -> String {
         }
     }
     text
+}
+
+/// The name of a hypothesis with these effects.
+pub(crate) fn name(effects: &[String]) -> String {
+    if effects.is_empty() { "no gap".into() } else { plain(&effects.join(" + ")) }
 }
 
 /// Odds in words, from their logarithm to the base 10.
@@ -145,8 +148,7 @@ pub fn terminal(result: &Diagnosis) -> String {
     let r = &result.report;
     let mut text = format!("{}\n\nHypotheses\n", r.text);
     for h in r.hypotheses.iter().filter(|h| h.probability > 0.005).take(8) {
-        let name = if h.effects.is_empty() { "no gap".to_string() } else { plain(&h.effects.join(" + ")) };
-        text.push_str(&format!("  {:>7}  {name}", probability(h.probability)));
+        text.push_str(&format!("  {:>7}  {}", probability(h.probability), name(&h.effects)));
         if let Some(others) = aliases(h) {
             text.push_str(&format!("  (cannot be separated from {others})"));
         }
@@ -172,14 +174,8 @@ pub fn terminal(result: &Diagnosis) -> String {
         "\nGap on passes that were not fitted, as a share of full friction\n  nominal baseline      {}\n  recalibrated baseline {}\n  verdict's model       {}\n  repeatability         {}\n",
         share(g.before_rmse), share(g.recalibrated_rmse), share(g.after_rmse), share(g.noise_floor_rmse)
     ));
-    if let (Some(s), Some([low, high])) = (g.shrinkage, g.shrinkage_ci95) {
-        text.push_str(&format!(
-            "  the removable gap {} by {:.0} % [{:.0}, {:.0}]\n",
-            if s < 0.0 { "grows" } else { "shrinks" },
-            100.0 * s.abs(),
-            100.0 * if s < 0.0 { -high } else { low },
-            100.0 * if s < 0.0 { -low } else { high }
-        ));
+    if let Some((verb, percent, Some([low, high]))) = g.change() {
+        text.push_str(&format!("  the removable gap {verb} by {percent:.0} % [{low:.0}, {high:.0}]\n"));
     }
     // Without edges the reason is among what cannot be tested.
     if let Some(record) = r.record.as_ref().filter(|record| record.is_judged()) {

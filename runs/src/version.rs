@@ -60,10 +60,7 @@ pub fn models() -> Models {
     }
 }
 
-/// SHA-256 of the running program's file: two builds of one version are two programs.
-///
-/// # Errors
-/// The file cannot be read.
+/// SHA-256 of the running program's file, if it can be read: two builds of one version are two programs.
 pub fn program_sha256() -> std::io::Result<String> {
     std::fs::File::open(std::env::current_exe()?).and_then(sha256_of)
 }

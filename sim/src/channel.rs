@@ -6,9 +6,8 @@
 use crate::amplifier::AmplifierStatus;
 use crate::noise::Noise;
 use crate::sensor::ForceSample;
-use crate::stage::StageStatus;
 use realtime::fault::FaultMode;
-use realtime::ports::Nanos;
+use realtime::ports::{Nanos, StageState};
 use serde::de::Error;
 use serde::{Deserialize, Deserializer, Serialize};
 use std::collections::VecDeque;
@@ -116,7 +115,7 @@ impl Message for AmplifierStatus {
     }
 }
 
-impl Message for StageStatus {
+impl Message for StageState {
     fn hold(&mut self, earlier: &Self) {
         (self.position_m, self.velocity_m_s) = (earlier.position_m, earlier.velocity_m_s);
     }
@@ -147,13 +146,10 @@ const QUEUE: usize = 4096;
 
 impl<T: Message> Gate<T> {
     pub(crate) fn new(channel: ChannelName, latency_s: f64, faults: &[ChannelFault], noise: Noise) -> Self {
+        let own = |fault: &&ChannelFault| fault.channel == channel && fault.fault != FaultMode::Ok;
         Self {
             latency: Nanos::from_seconds(latency_s),
-            faults: faults
-                .iter()
-                .filter(|f| f.channel == channel && f.fault != FaultMode::Ok)
-                .copied()
-                .collect(),
+            faults: faults.iter().filter(own).copied().collect(),
             queue: VecDeque::with_capacity(QUEUE),
             latest: None,
             held: None,
@@ -167,13 +163,9 @@ impl<T: Message> Gate<T> {
         self.offered += 1;
         let mut due = now.plus(self.latency);
         let mut stuck = false;
-        for fault in &self.faults {
-            if !fault.acts(now) {
-                continue;
-            }
+        for fault in self.faults.iter().filter(|fault| fault.acts(now)) {
             let strength = fault.strength();
             match fault.fault {
-                FaultMode::Ok => {}
                 FaultMode::Off => return,
                 FaultMode::Stuck => {
                     stuck = true;
@@ -181,25 +173,11 @@ impl<T: Message> Gate<T> {
                 }
                 FaultMode::Garbage => message.spoil(&mut self.noise),
                 FaultMode::Wrong => message.scale(strength),
-                FaultMode::Slow => {
-                    if !self.offered.is_multiple_of((strength.max(1.0)) as u64) {
-                        return;
-                    }
-                }
+                FaultMode::Slow if !self.offered.is_multiple_of((strength.max(1.0)) as u64) => return,
                 FaultMode::Delayed => due = due.plus(Nanos::from_seconds(strength)),
-                FaultMode::Intermittent => {
-                    if self.noise.chance(strength) {
-                        return;
-                    }
-                }
-                // Of readings only: no defects file can ask for them here.
-                FaultMode::Invalid
-                | FaultMode::Corrupt
-                | FaultMode::Disconnected
-                | FaultMode::Spikes
-                | FaultMode::Saturated
-                | FaultMode::Disordered
-                | FaultMode::ClockJump => {}
+                FaultMode::Intermittent if self.noise.chance(strength) => return,
+                // Those of readings only: no defects file can ask for them here.
+                _ => {}
             }
         }
         if !stuck {
@@ -213,12 +191,8 @@ impl<T: Message> Gate<T> {
 
     /// The latest message that has arrived.
     pub(crate) fn latest(&mut self, now: Nanos) -> Option<T> {
-        while let Some((due, message)) = self.queue.front() {
-            if *due > now {
-                break;
-            }
-            self.latest = Some(*message);
-            self.queue.pop_front();
+        while self.queue.front().is_some_and(|(due, _)| *due <= now) {
+            self.latest = self.queue.pop_front().map(|(_, message)| message);
         }
         self.latest
     }
@@ -233,8 +207,8 @@ impl<T: Message> Gate<T> {
 mod tests {
     use super::*;
 
-    fn message(i: u32) -> StageStatus {
-        StageStatus {
+    fn message(i: u32) -> StageState {
+        StageState {
             position_m: f64::from(i),
             velocity_m_s: 1.0,
             at_limit: false,

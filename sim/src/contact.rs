@@ -136,6 +136,11 @@ pub struct Steady {
     pub contact_fraction: f64,
 }
 
+impl Steady {
+    /// No contact.
+    pub const NONE: Self = Self { lateral_force_n: 0.0, contact_fraction: 0.0 };
+}
+
 /// Points over a slow modulation's period.
 const MODULATION_POINTS: usize = 6;
 /// Mid-points of seven equal shares of a mirrored gamma distribution of shape 2, mean 0 and deviation 1:
@@ -181,7 +186,7 @@ impl Contact {
     /// The periodic state under these conditions.
     pub fn steady(&self) -> Steady {
         if self.normal_force_n <= 0.0 {
-            return Steady { lateral_force_n: 0.0, contact_fraction: 0.0 };
+            return Steady::NONE;
         }
         if self.sine_amplitude_m <= 0.0 {
             return Steady { lateral_force_n: self.limit_at_rest_n(), contact_fraction: 1.0 };
@@ -245,7 +250,7 @@ impl Contact {
 
     /// Slow modulation: the mean over the modulation's period of the steady state at each of its amplitudes.
     fn steady_modulated(&self) -> Steady {
-        let mut sum = Steady { lateral_force_n: 0.0, contact_fraction: 0.0 };
+        let mut sum = Steady::NONE;
         for i in 0..MODULATION_POINTS {
             let phase = PI * (2 * i + 1) as f64 / (2 * MODULATION_POINTS) as f64;
             let mut at = *self;

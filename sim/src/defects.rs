@@ -124,17 +124,9 @@ pub struct DefectKind {
 impl DefectKind {
     /// A cause that a table of steady passes shows and the library has an effect for.
     const fn cause(place: Location, summary: &'static str) -> Self {
-        let act = Act::Setup(|_, _| {});
-        DefectKind {
-            name: "",
-            place,
-            in_library: true,
-            in_tables: true,
-            imitated: false,
-            summary,
-            parameters: &[],
-            act,
-        }
+        let (act, parameters) = (Act::Setup(|_, _| {}), [].as_slice());
+        let (name, in_library, in_tables, imitated) = ("", true, true, false);
+        DefectKind { name, place, in_library, in_tables, imitated, summary, parameters, act }
     }
 
     /// A fault of the rig, which is none of the causes that a table shows.
@@ -149,11 +141,7 @@ impl DefectKind {
 
     /// Draws its parameters.
     pub fn draw(&self, noise: &mut Noise) -> Values {
-        let mut values = Values::default();
-        for (value, parameter) in values.iter_mut().zip(self.parameters) {
-            *value = parameter.draw(noise);
-        }
-        values
+        std::array::from_fn(|i| self.parameters.get(i).map_or(0.0, |parameter| parameter.draw(noise)))
     }
 
     /// Sets its size to a share of its range: 0 the smallest, 1 the largest; a sign or a factor's side stays.

@@ -2,7 +2,7 @@
 //! on with a force controller of its own.
 
 use crate::noise::{Noise, Wander};
-use realtime::ports::Nanos;
+use realtime::ports::{Nanos, StageState};
 use serde::{Deserialize, Serialize};
 
 /// What the stage is.
@@ -70,23 +70,6 @@ pub struct StageInput {
     pub velocity_m_s: f64,
     /// Normal force (N); not positive: lift off.
     pub normal_force_n: f64,
-}
-
-/// What the stage publishes of itself.
-#[derive(Clone, Copy, Debug, PartialEq)]
-pub struct StageStatus {
-    /// Position (m).
-    pub position_m: f64,
-    /// Velocity (m/s).
-    pub velocity_m_s: f64,
-    /// At an end of its travel.
-    pub at_limit: bool,
-    /// It has a fault of its own.
-    pub fault: bool,
-    /// When this was taken, in the world's time.
-    pub taken_at: Nanos,
-    /// Count of states.
-    pub sequence: u32,
 }
 
 /// The stage's state.
@@ -207,9 +190,9 @@ impl Stage {
     }
 
     /// Its state.
-    pub fn status(&mut self, now: Nanos, sequence: u32) -> StageStatus {
+    pub fn status(&mut self, now: Nanos, sequence: u32) -> StageState {
         let c = &self.config;
-        StageStatus {
+        StageState {
             position_m: (self.position_m / c.encoder_m).round() * c.encoder_m,
             velocity_m_s: self.velocity_m_s * (1.0 + c.velocity_relative_sd * self.noise.normal()),
             at_limit: self.at_limit,

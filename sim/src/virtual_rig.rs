@@ -131,7 +131,7 @@ impl SupplySwitch for VirtualRig {
 impl SafetyInputs for VirtualRig {
     fn read(&mut self, now: Nanos) -> Contacts {
         self.world.advance_to(now);
-        let (operator, taken_at) = (self.world.operator(), self.world.now());
+        let (operator, taken_at) = (self.world.operator, self.world.now());
         let contact = |closed| Ok(Contact { closed, taken_at, sequence: taken_at.0 as u32 });
         Contacts {
             emergency_stop: contact(!operator.presses_emergency_stop),
@@ -155,15 +155,7 @@ impl Stage for VirtualRig {
 
     fn state(&mut self, now: Nanos) -> Result<StageState, NoData> {
         self.world.advance_to(now);
-        let status = self.world.stage_status().ok_or(NoData::NeverRead)?;
-        Ok(StageState {
-            position_m: status.position_m,
-            velocity_m_s: status.velocity_m_s,
-            at_limit: status.at_limit,
-            fault: status.fault,
-            taken_at: status.taken_at,
-            sequence: status.sequence,
-        })
+        self.world.stage_status().ok_or(NoData::NeverRead)
     }
 }
 

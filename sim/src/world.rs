@@ -11,7 +11,7 @@ mod config;
 mod ridge_table;
 mod steady;
 
-use realtime::ports::Nanos;
+use realtime::ports::{Nanos, StageState};
 
 pub use crate::room::RoomConfig;
 pub use config::{ConfigError, ContactMode, WorldConfig};
@@ -29,7 +29,7 @@ use crate::noise::Noise;
 use crate::plate::Plate;
 use crate::room::{Air, Room};
 use crate::sensor::{ForceSample, Sensor};
-use crate::stage::{Stage, StageInput, StageStatus};
+use crate::stage::{Stage, StageInput};
 
 /// What is true of the world at an instant: for scoring, never for a reader on the rig.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
@@ -50,8 +50,9 @@ pub struct Truth {
     pub contact_fraction: f64,
 }
 
-/// The hands of whoever stands at the virtual rig: what its safety contacts show.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+/// The hands of whoever stands at the virtual rig: what its safety contacts show. At first nothing is
+/// pressed, the guard shut, the dead-man device released.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub struct Operator {
     /// The emergency stop is pressed.
     pub presses_emergency_stop: bool,
@@ -59,13 +60,6 @@ pub struct Operator {
     pub opens_guard: bool,
     /// The dead-man device is held, from this time on; `None`: never.
     pub holds_dead_man_from: Option<Nanos>,
-}
-
-impl Default for Operator {
-    /// Nothing pressed, the guard shut, the dead-man device released.
-    fn default() -> Self {
-        Operator { presses_emergency_stop: false, opens_guard: false, holds_dead_man_from: None }
-    }
 }
 
 /// Speeds below this are standing still (m/s).
@@ -87,8 +81,10 @@ pub struct World {
     amplifier: Amplifier,
     sensor: Sensor,
     stage: Stage,
-    room: Room,
-    operator: Operator,
+    /// The air around the rig, and its chamber.
+    pub room: Room,
+    /// The hands at the safety contacts.
+    pub operator: Operator,
     averager: Averager,
     march: Option<March>,
     ridge: Option<RidgeTable>,
@@ -101,7 +97,7 @@ pub struct World {
     known_pp_m: f64,
     forces: Gate<ForceSample>,
     amplifier_states: Gate<AmplifierStatus>,
-    stage_states: Gate<StageStatus>,
+    stage_states: Gate<StageState>,
 }
 
 impl World {
@@ -230,10 +226,9 @@ impl World {
 
     /// The contact of this tick: amplitude under the finger (m) and the friction it yields.
     fn meet(&mut self, at: &Surroundings, known_pp: f64, speed: f64, dt: f64) -> (f64, Steady) {
-        let nothing = Steady { lateral_force_n: 0.0, contact_fraction: 0.0 };
         if at.normal_force_n <= 0.0 {
             self.march = None;
-            return (known_pp, nothing);
+            return (known_pp, Steady::NONE);
         }
         let point = Point { at: *at, known_pp_m: known_pp, speed_m_s: speed.max(STILL_M_S) };
         let contact = steady_contact(&self.finger, &self.config.defects, &point);
@@ -260,7 +255,7 @@ impl World {
     fn march_tick(&mut self, contact: &Contact, dt: f64) -> Steady {
         let march = self.march.get_or_insert_with(|| March::new(contact, MARCH_STEPS));
         let cycles = ((contact.frequency_hz * dt).round() as usize).max(1);
-        let mut sum = Steady { lateral_force_n: 0.0, contact_fraction: 0.0 };
+        let mut sum = Steady::NONE;
         for _ in 0..cycles {
             let cycle = march.cycle(contact);
             sum.lateral_force_n += cycle.lateral_n / cycles as f64;
@@ -280,7 +275,7 @@ impl World {
     }
 
     /// The stage's latest state that has arrived; `None` before the first.
-    pub fn stage_status(&mut self) -> Option<StageStatus> {
+    pub fn stage_status(&mut self) -> Option<StageState> {
         self.stage_states.latest(self.now)
     }
 
@@ -313,16 +308,6 @@ impl World {
         self.amplifier.supply_closed()
     }
 
-    /// The hands at the safety contacts.
-    pub fn operator(&self) -> Operator {
-        self.operator
-    }
-
-    /// What the hands at the safety contacts do from now on.
-    pub fn set_operator(&mut self, operator: Operator) {
-        self.operator = operator;
-    }
-
     /// Hangs dead weights on the force sensor, as an operator does at the bench: true forces from the next tick on (N).
     pub fn hang(&mut self, lateral_n: f64, normal_n: f64) {
         self.hung = Forces { lateral_n, normal_n };
@@ -341,16 +326,6 @@ impl World {
             temperature_c: self.room.of(Air::Temperature),
         };
         self.config.defects.plate(&at, self.known_pp_m)
-    }
-
-    /// The air around the rig.
-    pub fn room(&self) -> &Room {
-        &self.room
-    }
-
-    /// The air around the rig, to give its chamber a set-point.
-    pub fn room_mut(&mut self) -> &mut Room {
-        &mut self.room
     }
 
     /// What is true now: for scoring only.

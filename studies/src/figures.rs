@@ -9,6 +9,7 @@ pub mod reading;
 pub mod slider;
 pub mod store;
 
+use crate::campaign::measured::ends;
 pub use collapse::collapse;
 use miette::{IntoDiagnostic, miette};
 use models::ridge::study::{Panel, StudyPoint, content_key, fig_9_at};
@@ -133,16 +134,12 @@ pub fn phase_shift(base: RidgeCase, out: &Path, reading: Reading) -> miette::Res
     };
     // Where the curve passes levels of the way from contact to its plateau near 90.
     let crossing = |e: f64, level: f64| passing(&curve(e), level);
-    let chart = |name: &str, title: &str, moduli: [f64; 4], transition: [f64; 2]| Chart {
-        name: reading::file(reading, name),
-        stated: vec![
-            Stated::Span { range: transition, words: "transition (paper)".into() },
-            Stated::Level { value: 90.0, words: "plateau (paper)".into() },
-        ],
-        title: title.into(),
-        x: reading::column(reading).into(),
-        y: "phase_shift_deg".into(),
-        series: moduli.map(|e| Series::line(format!("E_sc {} MPa", e / 1e6), curve(e))).into(),
+    let chart = |name: &str, title: &str, moduli: [f64; 4], transition: [f64; 2]| {
+        let series = moduli.map(|e| Series::line(format!("E_sc {} MPa", e / 1e6), curve(e))).into();
+        let axes = [reading::column(reading), "phase_shift_deg"];
+        let stated =
+            vec![Stated::Span(transition, "transition (paper)"), Stated::Level(90.0, "plateau (paper)")];
+        Chart { stated, ..Chart::new(reading::file(reading, name), title, axes, series) }
     };
     let mut lines = Vec::new();
     for (what, e, paper) in [("moist", 28.3e6, "0.8 to 1.3"), ("dry", 202.4e6, "0.4 to 0.8")] {
@@ -174,16 +171,15 @@ pub fn velocities(base: RidgeCase, reading: Reading) -> miette::Result<Reproduce
     let turn = 2.0 * std::f64::consts::PI;
     let top = turn * case.frequency_hz * case.amplitude.sine_amplitude_m();
     let plate: Vec<f64> = (0..n).map(|i| top * (turn * (i as f64 + 0.5) / n as f64).cos()).collect();
-    let peak = |v: &[f64]| v.iter().fold(f64::NEG_INFINITY, |a, b| a.max(*b));
-    let trough = |v: &[f64]| v.iter().fold(f64::INFINITY, |a, b| a.min(*b));
+    let [trough, peak] = ends(skin);
     // From the greatest to the least velocity: the unloading is slower than the loading.
     let index = |target: f64| skin.iter().position(|v| *v == target).unwrap_or(0);
-    let (high, low) = (index(peak(skin)), index(trough(skin)));
+    let (high, low) = (index(peak), index(trough));
     let falling = ((low + n - high) % n) as f64 / n as f64;
     let line = format!(
         "dry, 1.35 \u{b5}m: skin {:.0} to {:.0} mm/s, plate +-{:.0} mm/s; the fall takes {:.0} % of the period, the rise {:.0} %; paper: the velocity peak is asymmetric, the unloading sloping through inertia (drawn; no number is stated)",
-        1e3 * trough(skin),
-        1e3 * peak(skin),
+        1e3 * trough,
+        1e3 * peak,
         1e3 * top,
         100.0 * falling,
         100.0 * (1.0 - falling)
@@ -238,15 +234,10 @@ pub fn reaction_force(base: RidgeCase, reading: Reading) -> miette::Result<Repro
         ));
     }
     lines.push("paper: always positive at 0.1 \u{b5}m, zero for a significant time at 1 \u{b5}m and longer at 2 \u{b5}m, the greatest force growing, the mean equal to the applied 0.25 N".into());
-    let chart = Chart {
-        name: reading::file(reading, "fig7"),
-        stated: vec![Stated::Level { value: base.normal_force_n, words: "applied (paper)".into() }],
-        title: "Reaction force of the finger (Fig. 7)".into(),
-        x: "time_periods".into(),
-        y: "reaction_force_n".into(),
-        series,
-    };
-    Ok(Reproduced { charts: vec![chart], lines })
+    let (name, axes) = (reading::file(reading, "fig7"), ["time_periods", "reaction_force_n"]);
+    let stated = vec![Stated::Level(base.normal_force_n, "applied (paper)")];
+    let chart = Chart::new(name, "Reaction force of the finger (Fig. 7)", axes, series);
+    Ok(Reproduced { charts: vec![Chart { stated, ..chart }], lines })
 }
 
 /// Fig. 8: reaction, Coulomb's limit and lateral force at 1.35 um.
@@ -312,23 +303,20 @@ pub fn parametric_study(study: Study, out: &Path) -> miette::Result<Reproduced> 
         ));
     }
     let spread = |panel: Panel| {
-        let mus: Vec<f64> = [3e-6, 4e-6, 5e-6]
-            .iter()
-            .map(|w| {
-                let all = panel.values().map(|v| at(panel, v, *w));
-                all.iter().fold(0.0, |a: f64, b| a.max(*b)) - all.iter().fold(1.0, |a: f64, b| a.min(*b))
-            })
-            .collect();
-        mus.iter().fold(0.0, |a: f64, b| a.max(*b))
+        let at_w = |w: f64| {
+            let [least, greatest] = ends(&panel.values().map(|v| at(panel, v, w)));
+            greatest - least
+        };
+        [3e-6, 4e-6, 5e-6].map(at_w).into_iter().fold(0.0, f64::max)
     };
     lines.push(format!(
         "above 2.5 \u{b5}m the modulus moves mu' by at most {:.3} and the normal force by {:.3}; paper: nearly independent of both there",
         spread(Panel::YoungModulus), spread(Panel::NormalForce)
     ));
+    let [least, greatest] = ends(&found.iter().map(|f| f.1.reaction_over_load).collect::<Vec<_>>());
     lines.push(format!(
         "mean reaction over load: {:.3} to {:.3} over the study (paper: 1, Eq. 4)",
-        found.iter().map(|f| f.1.reaction_over_load).fold(f64::INFINITY, f64::min),
-        found.iter().map(|f| f.1.reaction_over_load).fold(0.0, f64::max)
+        least, greatest
     ));
     Ok(Reproduced { charts, lines })
 }

@@ -30,33 +30,34 @@ pub fn bar(length: u64, what: &str) -> ProgressBar {
 /// ends with [`INTERRUPTED`]. A second Ctrl-C waits for nothing.
 ///
 /// # Errors
-/// The system gives no thread or no signals.
+/// As [`on_signals`].
 pub fn on_interrupt(bar: &ProgressBar, partial: impl FnOnce(u64) + Send + 'static) -> miette::Result<()> {
-    let mut caught = signal_hook::iterator::Signals::new([signal_hook::consts::SIGINT]).into_diagnostic()?;
     let bar = bar.clone();
     let mut partial = Some(partial);
-    std::thread::Builder::new()
-        .name("signals".into())
-        .spawn(move || {
-            for _ in caught.forever() {
-                let Some(partial) = partial.take() else {
-                    leave_now(INTERRUPTED);
-                    return;
-                };
-                let position = bar.position();
-                bar.finish_and_clear();
-                say!("stopped by Ctrl-C: what follows is partial");
-                // Printing it may take long, or fail: the next Ctrl-C does not wait for it.
-                let thread = std::thread::Builder::new().name("partial".into()).spawn(move || {
-                    partial(position);
-                    leave_now(INTERRUPTED);
-                });
-                if thread.is_err() {
-                    leave_now(INTERRUPTED);
-                }
-            }
-        })
-        .into_diagnostic()?;
+    on_signals(&[signal_hook::consts::SIGINT], move || {
+        let Some(partial) = partial.take() else { return leave_now(INTERRUPTED) };
+        let position = bar.position();
+        bar.finish_and_clear();
+        say!("stopped by Ctrl-C: what follows is partial");
+        // Printing it may take long, or fail: the next Ctrl-C does not wait for it.
+        let thread = std::thread::Builder::new().name("partial".into()).spawn(move || {
+            partial(position);
+            leave_now(INTERRUPTED);
+        });
+        if thread.is_err() {
+            leave_now(INTERRUPTED);
+        }
+    })
+}
+
+/// Calls `caught` at each of these signals, on a thread of its own.
+///
+/// # Errors
+/// The system gives no thread or no signals.
+pub fn on_signals(signals: &[i32], mut caught: impl FnMut() + Send + 'static) -> miette::Result<()> {
+    let mut signals = signal_hook::iterator::Signals::new(signals).into_diagnostic()?;
+    let each = move || signals.forever().for_each(|_| caught());
+    std::thread::Builder::new().name("signals".into()).spawn(each).into_diagnostic()?;
     Ok(())
 }
 
@@ -71,7 +72,7 @@ impl<T: Clone + Send + 'static> Study<T> {
     /// Of so many parts. On Ctrl-C `partial` gets what was found, and how many parts were done.
     ///
     /// # Errors
-    /// As [`on_interrupt`].
+    /// As [`on_signals`].
     pub fn begin(
         parts: u64,
         what: &str,

@@ -3,27 +3,29 @@
 mod cells;
 mod own;
 mod place;
+mod preflight;
 mod shape;
 mod written;
 
 use crate::schemas::bundled;
 use crate::schemas::schema::Kind;
 use miette::IntoDiagnostic;
-use models::prediction::{FrictionModel, SpringSlider};
-use realtime::ports::Nanos;
-use realtime::safety::{HARD, Limits};
+use models::finger::Finger;
+use models::prediction::FrictionModel;
 use runs::fingertip::FingertipFile;
 use runs::input::{BadInput, Problems, parse_toml, unit_meant, usual};
-use runs::plan::{Plan, Resolution};
-use runs::session::{Job, Summary};
+use runs::plan::Plan;
+use runs::session::Summary;
 use runs::setup::Setup;
-use std::path::{Path, PathBuf};
+use serde::de::DeserializeOwned;
+use std::path::Path;
 use std::sync::Arc;
 
-pub use place::{Problem, problems_of};
+pub use place::{Problem, problems_of, with_place_and_help};
+pub use preflight::preflight;
 
 use place::remedy;
-pub use place::with_place_and_help;
+use preflight::{complete, plan_on};
 
 /// What the plans are judged on.
 #[derive(Default)]
@@ -114,6 +116,11 @@ fn read_json(name: &str) -> miette::Result<serde_json::Value> {
     })
 }
 
+/// Refuses a JSON document that is none of these.
+fn holds<T: DeserializeOwned>(name: &str) -> miette::Result<()> {
+    serde_json::from_value::<T>(read_json(name)?).into_diagnostic().map(drop)
+}
+
 fn schema_of(kind: &str) -> Option<Kind> {
     let name = if kind == "rig.toml" { "rig" } else { kind };
     Kind::all().find(|k| k.name() == name && !matches!(k, Kind::Table | Kind::Verdict))
@@ -146,12 +153,11 @@ pub fn refusal(why: miette::Report, name: &str, kind: &'static str) -> miette::R
 fn in_whole(report: miette::Report, kind: &'static str, name: &str, on: &On) -> miette::Report {
     // A reader stops at the first key that it does not take: the schema goes on, and then the values.
     if let (Some(known), Ok(text)) = (schema_of(kind), text_of(name)) {
-        let mut problems = Problems::of(name, &text);
-        shape::toml(&known.schema(), &text, &mut problems);
+        let (schema, mut problems) = (known.schema(), Problems::of(name, &text));
+        shape::toml(&schema, &text, &mut problems);
         if !problems.is_empty() && matches!(kind, "setup" | "plan" | "fingertip" | "rig.toml") {
-            let meant = shape::as_meant(&known.schema(), &text);
-            let judged = meant.map(|meant| judge(kind, name, on, Some(meant)));
-            if let Some(Err(values)) = judged {
+            let meant = shape::as_meant(&schema, &text);
+            if let Some(Err(values)) = meant.map(|meant| judge(kind, name, on, Some(meant))) {
                 let values = with_place_and_help(values, name, Some(kind));
                 place::put_all(&values, &text, &mut problems);
             }
@@ -165,115 +171,77 @@ fn in_whole(report: miette::Report, kind: &'static str, name: &str, on: &On) -> 
 
 /// Judges a file, or `instead` of what stands in it.
 fn judge(kind: &'static str, name: &str, on: &On, instead: Option<String>) -> miette::Result<Good> {
-    let (path, good) = (Path::new(name), Good { kind, passes: None, remarks: Vec::new() });
-    let folder = path.parent().unwrap_or(Path::new("."));
+    let path = Path::new(name);
+    let good = |passes| Good { kind, passes, remarks: Vec::new() };
     if let Some(judged) = own::judge(kind, path) {
-        return judged.map(|passes| Good { passes, ..good });
+        return judged.map(good);
     }
     match kind {
-        "table" => return written::table(path),
-        "record" => return written::record(path).map(|()| good),
-        "journal" => return written::journal(path).map(|passes| Good { passes, ..good }),
-        "run" => return written::run_folder(path).map(|passes| Good { passes: Some(passes), ..good }),
-        "verdict" => return written::verdict(name).map(|()| good),
-        "import log" => return Ok(good),
-        "summary" => {
-            serde_json::from_value::<Summary>(read_json(name)?).into_diagnostic()?;
-            return Ok(good);
+        "table" => written::table(path),
+        "record" => written::record(path).map(|()| good(None)),
+        "journal" => written::journal(path).map(good),
+        "run" => written::run_folder(path).map(Some).map(good),
+        "verdict" => written::verdict(name).map(|()| good(None)),
+        "import log" => Ok(good(None)),
+        "summary" => holds::<Summary>(name).map(|()| good(None)),
+        _ => {
+            let text = instead.map_or_else(|| text_of(name), Ok)?;
+            judge_text(kind, name, on, &text).map(|(passes, remarks)| Good { kind, passes, remarks })
         }
-        _ => {}
     }
-    let text = instead.map_or_else(|| text_of(name), Ok)?;
-    let mut remarks = Vec::new();
+}
+
+/// Judges what people write: the passes of a plan, and what looks wrong.
+fn judge_text(kind: &str, name: &str, on: &On, text: &str) -> miette::Result<(Option<usize>, Vec<String>)> {
+    let (path, mut remarks) = (Path::new(name), Vec::new());
+    let folder = path.parent().unwrap_or(Path::new("."));
     match kind {
         "profile" => {
-            let refused = |problem: String| miette::miette!("{problem}");
-            if path.exists() {
-                runs::rehearsal::of(path).map_err(refused)?;
-            } else {
-                drivers::profile(name).map_err(|e| refused(e.to_string()))?;
-            }
+            let known = match path.exists() {
+                true => runs::rehearsal::of(path).map(drop),
+                false => drivers::profile(name).map(drop).map_err(|e| e.to_string()),
+            };
+            known.map_err(|problem| miette::miette!("{problem}"))?;
         }
         "setup" => {
-            let setup = Setup::parse(name, &text, folder)?;
+            let setup = Setup::parse(name, text, folder)?;
             complete(&setup)?;
             // What the virtual rig serves is opened when it runs.
             on.ports.filter(|_| setup.file.virtual_rig.is_none()).map_or(Ok(()), |opens| opens(&setup))?;
-            remarks = finger_remarks(&[
-                ("normal_stiffness_n_per_m", setup.tip.finger.normal_stiffness_n_per_m),
-                ("lateral_stiffness_n_per_m", setup.tip.finger.lateral_stiffness_n_per_m),
-                ("force_sd_n", setup.file.noise.force_sd_n),
-            ]);
+            remarks = finger_remarks(&setup.tip.finger, &[("force_sd_n", setup.file.noise.force_sd_n)]);
         }
-        "plan" => {
-            let passes = plan_on(on, Plan::parse(name, &text)?)?;
-            return Ok(Good { passes, ..good });
-        }
+        "plan" => return Ok((plan_on(on, Plan::parse(name, text)?)?, remarks)),
         "campaign" => {
-            let campaign = runs::campaign::Campaign::parse(name, &text, folder)?;
-            let mut passes = 0;
-            for setup in &campaign.setups {
-                passes += preflight(setup, campaign.plan.clone(), on.model.as_ref(), None)?;
-            }
-            return Ok(Good { passes: Some(passes * campaign.file.blocks as usize), ..good });
+            let campaign = runs::campaign::Campaign::parse(name, text, folder)?;
+            let passes = |setup| preflight(setup, campaign.plan.clone(), on.model.as_ref(), None);
+            let passes: usize = campaign.setups.iter().map(passes).sum::<miette::Result<_>>()?;
+            return Ok((Some(passes * campaign.file.blocks as usize), remarks));
         }
-        "certificate" => runs::calibrate::check(name, &text).map(|_| ())?,
+        "certificate" => runs::calibrate::check(name, text).map(drop)?,
         "defects file" => {
-            let defects = sim::defects::Defects::parse(&text).map_err(|e| miette::miette!("{e}"))?;
+            let defects = sim::defects::Defects::parse(text).map_err(|e| miette::miette!("{e}"))?;
             let config = sim::world::WorldConfig { defects, ..sim::world::WorldConfig::ideal() };
             sim::world::World::new(&config, 1).map_err(|e| miette::miette!("{e}"))?;
         }
-        "model" => {
-            match &on.setup {
-                Some(setup) => runs::model_file::load_for(setup, name, &text)?,
-                None => runs::model_file::load(name, &text)?,
-            };
-        }
+        "model" => match &on.setup {
+            Some(setup) => runs::model_file::load_for(setup, name, text).map(drop)?,
+            None => runs::model_file::load(name, text).map(drop)?,
+        },
         "fingertip" => {
-            let tip = fingertip(name, &text)?;
-            remarks = finger_remarks(&[
-                ("normal_stiffness_n_per_m", tip.finger.normal_stiffness_n_per_m),
-                ("lateral_stiffness_n_per_m", tip.finger.lateral_stiffness_n_per_m),
-                ("young_modulus_pa", tip.finger.young_modulus_pa.unwrap_or(1e6)),
-                ("radius_m", tip.radius_m),
-            ]);
+            let tip = fingertip(name, text)?;
+            let modulus = tip.finger.young_modulus_pa.unwrap_or(1e6);
+            remarks =
+                finger_remarks(&tip.finger, &[("young_modulus_pa", modulus), ("radius_m", tip.radius_m)]);
         }
-        "identity" => {
-            parse_toml::<runs::run_dir::Identity>(name, &text)?;
-        }
+        "identity" => drop(parse_toml::<runs::run_dir::Identity>(name, text)?),
         _ => {
-            let rig = runs::input::rig_text(name, &text)?;
-            remarks = finger_remarks(&[
-                ("normal_stiffness_n_per_m", rig.finger.normal_stiffness_n_per_m),
-                ("lateral_stiffness_n_per_m", rig.finger.lateral_stiffness_n_per_m),
-                ("young_modulus_pa", rig.finger.young_modulus_pa.unwrap_or(1e6)),
-                ("force_sd_n", rig.noise.force_sd_n),
-            ]);
+            let rig = runs::input::rig_text(name, text)?;
+            let modulus = rig.finger.young_modulus_pa.unwrap_or(1e6);
+            let further = [("young_modulus_pa", modulus), ("force_sd_n", rig.noise.force_sd_n)];
+            remarks = finger_remarks(&rig.finger, &further);
         }
     }
-    Ok(Good { remarks, ..good })
-}
-
-/// The passes of a plan on its setup; none where it is judged by itself.
-fn plan_on(on: &On, plan: Plan) -> miette::Result<Option<usize>> {
-    let Some(setup) = &on.setup else {
-        let fine = Resolution { amplitude_pp_m: 0.0, frequency_hz: 0.0 };
-        plan.points(plan.file.seed, &widest(), &fine)?;
-        // The file of a target; how large a lateral force may be, the fingertip of a setup says.
-        plan.target(1e6, None)?;
-        return Ok(None);
-    };
-    complete(setup)?;
-    let passes = preflight(setup, plan, on.model.as_ref(), None);
-    let ports = on.ports.map_or(Ok(()), |opens| opens(setup));
-    match (passes, ports) {
-        (Ok(passes), Ok(())) => Ok(Some(passes)),
-        (Err(why), Ok(())) | (Ok(_), Err(why)) => Err(why),
-        (Err(why), Err(closed)) => {
-            let help = [&why, &closed].into_iter().flat_map(problems_of).filter_map(|p| p.help);
-            Err(miette::miette!(help = help.collect::<Vec<_>>().join("; "), "{why}; {closed}"))
-        }
-    }
+    Ok((None, remarks))
 }
 
 /// A fingertip without a problem.
@@ -281,88 +249,21 @@ fn fingertip(name: &str, text: &str) -> miette::Result<FingertipFile> {
     let tip: FingertipFile = parse_toml(name, text)?;
     let mut wrong = Problems::of(name, text);
     for (place, problem) in tip.problems() {
-        let meant = match place.as_slice() {
-            ["radius_m"] => unit_meant("radius_m", tip.radius_m, usual("radius_m")),
-            _ => None,
-        };
+        let radius = Some(tip.radius_m).filter(|_| place == ["radius_m"]);
+        let meant = radius.and_then(|radius| unit_meant("radius_m", radius, usual("radius_m")));
         wrong.add(&place, problem, meant);
     }
     wrong.end()?;
     Ok(tip)
 }
 
-fn finger_remarks(values: &[(&str, f64)]) -> Vec<String> {
-    values
-        .iter()
-        .filter_map(|(key, value)| {
-            unit_meant(key, *value, usual(key)).map(|meant| format!("{key} = {meant}"))
-        })
-        .collect()
-}
-
-/// What a run asks of a setup beyond what reading it does: both axes, and an amplifier with which the loop would ever be armed.
-fn complete(setup: &Setup) -> miette::Result<()> {
-    let mut wrong = Problems::of(&setup.origin, &setup.text);
-    if let Err(problem) = setup.has_both_axes() {
-        let remedy = "give each of the axes `lateral` and `normal` one signal of one instrument";
-        wrong.add(&["force"], problem.to_string(), remedy.to_string());
-    }
-    let limits = &setup.config.limits;
-    let amplifier = setup.file.amplifier.description().map_err(|e| miette::miette!("{e}"))?;
-    if limits.temperature_fitted && amplifier.signal("temperature").is_none() {
-        let problem =
-            format!("`{}` has no thermometer: the rig would never be armed (SR-25)", amplifier.id());
-        wrong.add(&["amplifier", "profile"], problem, runs::setup::THERMOMETER.to_string());
-    }
-    if !limits.amplifier_watchdog && setup.file.supply_relay.is_none() {
-        let problem = format!("`{}` has no watchdog: the rig would never be armed (SR-38)", amplifier.id());
-        let remedy = "give the rig a second switch-off channel, [supply_relay]".to_string();
-        wrong.add(&["amplifier", "profile"], problem, remedy);
-    }
-    wrong.end()
-}
-
-/// Everything that a run looks at in a plan before it touches rig or folder; the lateral channel's noise in
-/// N, where it was found. Returns the number of passes.
-///
-/// # Errors
-/// What the run would refuse.
-pub fn preflight(
-    setup: &Setup,
-    plan: Plan,
-    model: Option<&Arc<dyn FrictionModel>>,
-    noise_n: Option<f64>,
-) -> miette::Result<usize> {
-    let model = match model {
-        Some(model) => Arc::clone(model),
-        None => Arc::new(SpringSlider::new(setup.tip.finger).into_diagnostic()?),
-    };
-    let seed = plan.file.seed;
-    let (setup, out) = (setup.clone(), PathBuf::new());
-    let job = Job {
-        setup,
-        plan,
-        seed,
-        model,
-        model_file: None,
-        defects: None,
-        out,
-        fast: false,
-        notes: Default::default(),
-        answers: None,
-    };
-    Ok(job.points_seen(noise_n)?.0.len())
-}
-
-/// The limits of a rig that has the hard ones only.
-fn widest() -> Limits {
-    /// The longest travel that a setup may state, m.
-    const TRAVEL_M: f64 = 0.5;
-    let mut limits = Limits::paper(Nanos(1_000_000));
-    limits.normal_force_max_n = HARD.normal_force_max_n;
-    limits.amplitude_max = HARD.amplitude_max;
-    limits.frequency_hz = HARD.frequency_hz;
-    limits.speed_max_m_s = HARD.speed_max_m_s;
-    limits.travel_m = (-TRAVEL_M, TRAVEL_M);
-    limits
+/// Values of a finger and further ones that look as if they were in another unit.
+fn finger_remarks(finger: &Finger, further: &[(&str, f64)]) -> Vec<String> {
+    let stiffnesses = [
+        ("normal_stiffness_n_per_m", finger.normal_stiffness_n_per_m),
+        ("lateral_stiffness_n_per_m", finger.lateral_stiffness_n_per_m),
+    ];
+    let meant =
+        |(key, value): &(&str, f64)| Some(format!("{key} = {}", unit_meant(key, *value, usual(key))?));
+    stiffnesses.iter().chain(further).filter_map(meant).collect()
 }

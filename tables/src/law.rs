@@ -1,7 +1,7 @@
 //! A friction law by name or from a file, CSV and Parquet alike; a law that was tabulated, as the file that
 //! is written.
 
-use crate::import::parquet_as_csv;
+use crate::import::{as_csv, is_parquet};
 use calibration::certificate::sha256_hex;
 use miette::{Context, IntoDiagnostic};
 use models::finger::Finger;
@@ -33,12 +33,10 @@ pub struct Loaded {
 /// # Errors
 /// A file that cannot be read or used: says where, and what to type.
 pub fn for_run(what: &Path, setup: &Setup) -> miette::Result<Loaded> {
-    if let Some(model) = built_in(&what.to_string_lossy(), &setup.tip.finger) {
-        return Ok(Loaded { model: model?, file: None });
-    }
-    let (name, text) = text_of(what)?;
-    let model = load_for(setup, &what.display().to_string(), &text)?;
-    Ok(Loaded { model, file: Some((model_name(&name, &text), text)) })
+    named(what, &setup.tip.finger, |shown, name, text| {
+        let model = load_for(setup, shown, &text)?;
+        Ok(Loaded { model, file: Some((model_name(&name, &text), text)) })
+    })
 }
 
 /// The law that `--model` names, as the base of a diagnosis.
@@ -46,11 +44,21 @@ pub fn for_run(what: &Path, setup: &Setup) -> miette::Result<Loaded> {
 /// # Errors
 /// As [`for_run`].
 pub fn for_finger(what: &Path, finger: &Finger) -> miette::Result<Loaded> {
-    if let Some(model) = built_in(&what.to_string_lossy(), finger) {
+    named(what, finger, |shown, name, text| of_text(shown, name, text, finger))
+}
+
+/// A built-in law, or the file as `loads` takes it: how messages call it, its name and its text.
+fn named(
+    what: &Path,
+    finger: &Finger,
+    loads: impl FnOnce(&str, String, String) -> miette::Result<Loaded>,
+) -> miette::Result<Loaded> {
+    let shown = what.to_string_lossy();
+    if let Some(model) = built_in(&shown, finger) {
         return Ok(Loaded { model: model?, file: None });
     }
     let (name, text) = text_of(what)?;
-    of_text(&what.display().to_string(), name, text, finger)
+    loads(&shown, name, text)
 }
 
 /// A law from its text, as the base of a diagnosis; `shown` is how messages call it.
@@ -74,13 +82,9 @@ fn text_of(path: &Path) -> miette::Result<(String, String)> {
         miette::miette!(help = format!("--model takes {names}"), "{e}")
     })?;
     let name = path.file_name().map_or_else(|| "law".into(), |n| n.to_string_lossy());
-    if bytes.starts_with(b"PAR1") {
-        return Ok((format!("{name}.csv"), parquet_as_csv(path)?));
-    }
-    let text = String::from_utf8(bytes)
-        .into_diagnostic()
-        .wrap_err_with(|| format!("{}: no text", path.display()))?;
-    Ok((name.into_owned(), text))
+    let name = if is_parquet(&bytes) { format!("{name}.csv") } else { name.into_owned() };
+    let text = String::from_utf8(as_csv(path, &bytes)?.into_owned()).into_diagnostic();
+    Ok((name, text.wrap_err_with(|| format!("{}: no text", path.display()))?))
 }
 
 /// The candidate effects of the user's own in these files, by their numbers; the name of each is that of its file.

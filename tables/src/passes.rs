@@ -1,5 +1,6 @@
 //! A point table from its bytes, CSV or Parquet.
 
+use crate::import::as_csv;
 use miette::{Context, IntoDiagnostic};
 use models::pass::{Pass, read_passes};
 use std::path::Path;
@@ -9,9 +10,6 @@ use std::path::Path;
 /// # Errors
 /// A table that cannot be read, with its row.
 pub fn parse_passes(path: &Path, bytes: &[u8]) -> miette::Result<Vec<Pass>> {
-    if bytes.starts_with(b"PAR1") {
-        let csv = crate::import::parquet_as_csv(path).wrap_err_with(|| path.display().to_string())?;
-        return read_passes(csv.as_bytes()).into_diagnostic().wrap_err_with(|| path.display().to_string());
-    }
-    read_passes(bytes).into_diagnostic().wrap_err_with(|| path.display().to_string())
+    let read = as_csv(path, bytes).and_then(|csv| read_passes(&csv[..]).into_diagnostic());
+    read.wrap_err_with(|| path.display().to_string())
 }

@@ -170,7 +170,7 @@ fn score(folder: &Path, options: &Options, changes: &[Constants]) -> Result<Line
         description: fitted
             .shapes
             .iter()
-            .take(3)
+            .take(8)
             .map(|s| {
                 format!(
                     "{:?} {} {:.4} {:?} size {:.4} nats {:.1}",

@@ -3,7 +3,7 @@
 
 use super::Chance;
 use instruments::Profile;
-use instruments::codec::can::{CanFrame, SlcanMessage, SlcanReader, slcan_line};
+use instruments::codec::can::{CanFrame, SlcanReader, slcan_line};
 use instruments::codec::canopen::{self, DriveState, SdoAnswer};
 use instruments::codec::checksum::Check;
 use instruments::codec::eds;
@@ -40,7 +40,7 @@ pub fn modbus_rtu(input: &[u8], _: &mut Chance) {
     let _ = rtu::written(&question, input);
 }
 
-fn said(pieces: &[&[u8]]) -> Vec<SlcanMessage> {
+fn said(pieces: &[&[u8]]) -> Vec<CanFrame> {
     let (mut reader, mut all) = (SlcanReader::default(), Vec::new());
     pieces.iter().for_each(|piece| reader.push(piece, |one| all.push(one)));
     all
@@ -51,10 +51,8 @@ pub fn slcan(input: &[u8], chance: &mut Chance) {
     let whole = said(&[input]);
     let (head, tail) = input.split_at(chance.below(input.len() + 1));
     assert_eq!(whole, said(&[head, tail]), "split at {}", head.len());
-    for one in whole {
-        if let SlcanMessage::Frame(frame) = one {
-            assert_eq!(said(&[&slcan_line(&frame)]), [SlcanMessage::Frame(frame)]);
-        }
+    for frame in whole {
+        assert_eq!(said(&[&slcan_line(&frame)]), [frame]);
     }
 }
 

@@ -2,7 +2,7 @@
 
 use super::{AmplitudeError, AmplitudePoint, check, lack_of_fit, relative_scatter};
 use crate::regression::Fit;
-use crate::regression::nonlinear::{Scatter, fit};
+use crate::regression::nonlinear::fit;
 
 /// Exponent of the load: the finger's impedance goes with its contact area.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Default)]
@@ -57,12 +57,10 @@ pub fn droop(points: &[AmplitudePoint], exponent: Exponent) -> Result<Droop, Amp
         value
     };
     let top = points.iter().fold(0f64, |m, p| m.max(p.amplitude_pp_m));
-    let fit = fit(&model, &y, Scatter::Unknown, &[top.ln(), 0.05])?;
+    let fit = fit(&model, &y, &[top.ln(), 0.05])?;
     if let Some(p) = lack_of_fit(points, fit.residuals.as_slice(), 2).filter(|p| *p < 1e-3) {
-        return Err(AmplitudeError::LackOfFit {
-            p,
-            remedy: "try the other exponent, and check the drive's limit",
-        });
+        let remedy = "try the other exponent, and check the drive's limit";
+        return Err(AmplitudeError::LackOfFit { p, remedy });
     }
     Ok(Droop {
         coefficient: [fit.estimates[1], fit.standard_uncertainty(1)],

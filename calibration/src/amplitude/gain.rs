@@ -1,7 +1,7 @@
 //! Set-point (or drive current) to peak-to-peak amplitude.
 
 use super::{AmplitudeError, AmplitudePoint, check, lack_of_fit, relative_scatter};
-use crate::regression::{Fit, linear};
+use crate::regression::{Fit, ends, linear};
 use nalgebra::{DMatrix, DVector};
 
 /// Form of the curve.
@@ -79,9 +79,7 @@ pub fn fit(
         return Err(AmplitudeError::LackOfFit { p, remedy });
     }
     let type_b = &fit.estimates * fit.estimates.transpose() * vibrometer_relative_sd.powi(2);
-    let range =
-        points.iter().fold([f64::INFINITY, f64::NEG_INFINITY], |[a, b], p| [a.min(p.at), b.max(p.at)]);
-    Ok(GainFit { form, fit, type_b, lack_of_fit_p: p, range })
+    Ok(GainFit { form, fit, type_b, lack_of_fit_p: p, range: ends(points.iter().map(|p| p.at)) })
 }
 
 /// The slope between the two highest set-points against the slope through the lower ones.

@@ -4,8 +4,7 @@
 //! and leaves no node. `d = 1` is that of a pure standing wave.
 
 use super::{AmplitudeError, AmplitudePoint, check, relative_scatter};
-use crate::regression::nonlinear::{Scatter, fit};
-use crate::regression::{Fit, FitError};
+use crate::regression::{Fit, ends, nonlinear};
 use std::f64::consts::PI;
 
 /// A fitted mode shape.
@@ -31,8 +30,7 @@ pub struct ModeShape {
 /// Fewer than ten positions, or no convergence.
 pub fn mode_shape(points: &[AmplitudePoint]) -> Result<ModeShape, AmplitudeError> {
     check(points, "positions", 10)?;
-    let range_m =
-        points.iter().fold([f64::INFINITY, f64::NEG_INFINITY], |[a, b], p| [a.min(p.at), b.max(p.at)]);
+    let range_m = ends(points.iter().map(|p| p.at));
     let (length, middle) = (range_m[1] - range_m[0], 0.5 * (range_m[0] + range_m[1]));
     let top = points.iter().fold(0f64, |m, p| m.max(p.amplitude_pp_m));
     let scatter: Vec<f64> = relative_scatter(points).iter().map(|s| s / top).collect();
@@ -60,13 +58,8 @@ pub fn mode_shape(points: &[AmplitudePoint]) -> Result<ModeShape, AmplitudeError
         .map(|start| (misfit(&model, &y, &start), start))
         .collect();
     starts.sort_by(|a, b| a.0.total_cmp(&b.0));
-    let best = starts
-        .iter()
-        .take(8)
-        .filter_map(|(_, start)| fit(&model, &y, Scatter::Unknown, start).ok())
-        .filter(|f: &Fit| f.estimates[2] > 0.0)
-        .min_by(|a, b| a.residual_sum_of_squares.total_cmp(&b.residual_sum_of_squares));
-    let mut fit = best.ok_or(FitError::NotConverged { iterations: 0 })?;
+    let starts = starts.into_iter().take(8).map(|(_, start)| start);
+    let mut fit = nonlinear::best(&model, &y, starts, |f| f.estimates[2] > 0.0)?;
     // The antinode nearest to the middle: the same curve, a position that can be compared.
     let half = fit.estimates[2] / 2.0;
     let steps = ((middle - fit.estimates[1]) / half).round();

@@ -1,8 +1,7 @@
 //! Resonance frequency and quality factor from a frequency sweep at constant drive.
 
 use super::{AmplitudeError, AmplitudePoint, check, relative_scatter};
-use crate::regression::nonlinear::{Scatter, fit};
-use crate::regression::{Fit, FitError};
+use crate::regression::{Fit, FitError, nonlinear};
 
 /// The resonance that a sweep shows.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -26,10 +25,10 @@ pub struct Resonance {
 /// Fewer than seven frequencies, a sweep that does not hold the resonance, no convergence.
 pub fn sweep(points: &[AmplitudePoint]) -> Result<Resonance, AmplitudeError> {
     check(points, "frequencies", 7)?;
-    let top = points.iter().max_by(|a, b| a.amplitude_pp_m.total_cmp(&b.amplitude_pp_m)).copied();
-    let Some(top) = top else {
-        return Err(AmplitudeError::TooFew { what: "frequencies", found: 0, needed: 7 });
-    };
+    let top = *points
+        .iter()
+        .max_by(|a, b| a.amplitude_pp_m.total_cmp(&b.amplitude_pp_m))
+        .ok_or(AmplitudeError::TooFew { what: "frequencies", found: 0, needed: 7 })?;
     for (end, beyond) in
         [("lower", points.iter().all(|p| p.at >= top.at)), ("upper", points.iter().all(|p| p.at <= top.at))]
     {
@@ -66,16 +65,8 @@ fn best(points: &[AmplitudePoint], top: &AmplitudePoint, width: f64) -> Result<F
         g[3] = lorentz * delta;
         value
     };
-    let mut found: Option<Fit> = None;
-    for factor in [1.0, 0.5, 2.0] {
-        let start = [top.at, (factor * top.at / width).ln(), top.amplitude_pp_m.ln(), 0.0];
-        if let Ok(f) = fit(&model, &y, Scatter::Unknown, &start)
-            && found.as_ref().is_none_or(|b| f.residual_sum_of_squares < b.residual_sum_of_squares)
-        {
-            found = Some(f);
-        }
-    }
-    found.ok_or(FitError::NotConverged { iterations: 0 })
+    let start = |factor: f64| [top.at, (factor * top.at / width).ln(), top.amplitude_pp_m.ln(), 0.0];
+    nonlinear::best(&model, &y, [1.0, 0.5, 2.0].map(start), |_| true)
 }
 
 #[cfg(test)]

@@ -37,16 +37,12 @@ impl Decoder {
     /// # Errors
     /// A text that is not a range or not a delay.
     pub fn from_settings(name: &str, range: &str, delay: &str) -> Result<Self, SettingError> {
-        let (what, like) = ("range", "5mm/s/V");
-        let refused = || SettingError { text: range.into(), what, like };
-        let body = range.trim().strip_suffix("/s/V").ok_or_else(refused)?;
-        let range_m_s_per_v = scaled(body, 'm').filter(|r| *r > 0.0).ok_or_else(refused)?;
-        let (what, like) = ("signal delay", "8.16 us");
-        let delay_s = scaled(delay, 's').filter(|d| *d >= 0.0).ok_or(SettingError {
-            text: delay.into(),
-            what,
-            like,
-        })?;
+        let wrong = |text: &str, what, like| SettingError { text: text.into(), what, like };
+        let per_volt = range.trim().strip_suffix("/s/V").and_then(|body| scaled(body, 'm'));
+        let range_m_s_per_v =
+            per_volt.filter(|r| *r > 0.0).ok_or_else(|| wrong(range, "range", "5mm/s/V"))?;
+        let delay_s = scaled(delay, 's').filter(|d| *d >= 0.0);
+        let delay_s = delay_s.ok_or_else(|| wrong(delay, "signal delay", "8.16 us"))?;
         Ok(Decoder { name: name.trim().into(), range_m_s_per_v, delay_s })
     }
 }

@@ -3,9 +3,9 @@
 //! `ln mu0 = ln m + (n - 1) ln(F/F0) + s ln(U/U0) + ln(1 + g (1 - exp(-t/tau)))`: the load exponent of a
 //! non-Coulombic contact , rate dependence, and occlusion or ageing with time.
 
-use super::FingerError;
-use crate::regression::Fit;
-use crate::regression::nonlinear::{Scatter, fit};
+use super::{FingerError, enough};
+use crate::regression::nonlinear::{best, fit};
+use crate::regression::{Fit, ends};
 use crate::uncertainty::student::coverage_factor;
 use serde::Deserialize;
 use std::collections::BTreeMap;
@@ -69,20 +69,14 @@ pub fn friction(points: &[FrictionPoint]) -> Result<FrictionFit, FingerError> {
         v.dedup_by(|a, b| (*a / *b - 1.0).abs() < 0.05);
         v.len()
     };
-    for (what, found) in [
-        ("different loads", distinct(&|p| p.normal_force_n)),
-        ("different speeds", distinct(&|p| p.speed_m_s)),
-    ] {
-        if found < 3 {
-            return Err(FingerError::TooFew { what, found, needed: 3 });
-        }
-    }
+    enough("different loads", distinct(&|p| p.normal_force_n), 3)?;
+    enough("different speeds", distinct(&|p| p.speed_m_s), 3)?;
     let mean_ln = |f: &dyn Fn(&FrictionPoint) -> f64| {
         points.iter().map(|p| f(p).ln()).sum::<f64>() / points.len() as f64
     };
     let (f0, u0) = (mean_ln(&|p| p.normal_force_n), mean_ln(&|p| p.speed_m_s));
     let times: Option<Vec<f64>> = points.iter().map(|p| p.contact_time_s).collect();
-    let span = |v: &[f64]| v.iter().fold([f64::INFINITY, 0f64], |[a, b], t| [a.min(*t), b.max(*t)]);
+    let span = |v: &[f64]| ends(v.iter().copied());
     let timed = times.filter(|t| {
         let [low, high] = span(t);
         high >= 5.0 * low.max(0.1)
@@ -95,8 +89,8 @@ pub fn friction(points: &[FrictionPoint]) -> Result<FrictionFit, FingerError> {
         b[0] + b[1] * g[1] + b[2] * g[2]
     };
     let start = y.iter().sum::<f64>() / y.len() as f64;
-    let best = match &timed {
-        None => fit(&straight, &y, Scatter::Unknown, &[start, 0.0, 0.0])?,
+    let fit = match &timed {
+        None => fit(&straight, &y, &[start, 0.0, 0.0])?,
         Some(times) => {
             let model = |i: usize, b: &[f64], g: &mut [f64]| {
                 let base = straight(i, b, g);
@@ -109,22 +103,17 @@ pub fn friction(points: &[FrictionPoint]) -> Result<FrictionFit, FingerError> {
             };
             let [low, high] = span(times);
             // The time constant may lie anywhere in the record: the best of several starts counts.
-            [0.1, 0.3, 0.7]
-                .iter()
-                .filter_map(|x| {
-                    let tau = low.max(0.1) * (high / low.max(0.1)).powf(*x);
-                    fit(&model, &y, Scatter::Unknown, &[start, 0.0, 0.0, 0.3, tau.ln()]).ok()
-                })
-                .min_by(|a, b| a.residual_sum_of_squares.total_cmp(&b.residual_sum_of_squares))
-                // No time dependence to be seen: its time constant is then not determined.
-                .map_or_else(|| fit(&straight, &y, Scatter::Unknown, &[start, 0.0, 0.0]), Ok)?
+            let tau = |x: f64| low.max(0.1) * (high / low.max(0.1)).powf(x);
+            let starts = [0.1, 0.3, 0.7].map(|x| [start, 0.0, 0.0, 0.3, tau(x).ln()]);
+            // No time dependence to be seen: its time constant is then not determined.
+            best(&model, &y, starts, |_| true).or_else(|_| fit(&straight, &y, &[start, 0.0, 0.0]))?
         }
     };
-    let bound = |f: &dyn Fn(&FrictionPoint) -> f64| span(&points.iter().map(f).collect::<Vec<f64>>());
+    let bound = |f: &dyn Fn(&FrictionPoint) -> f64| ends(points.iter().map(f));
     Ok(FrictionFit {
         reference_force_n: f0.exp(),
         reference_speed_m_s: u0.exp(),
-        fit: best,
+        fit,
         bounds: [
             bound(&|p| p.normal_force_n),
             bound(&|p| p.speed_m_s),

@@ -5,7 +5,7 @@
 //! what the rig repeats to. The interval of the ratio is its profile, `k_n` and `mu_0` sought again at each
 //! value. Where the passes scatter more than stated, the interval is as much wider.
 
-use super::FingerError;
+use super::{FingerError, enough};
 use models::condition::Condition;
 use models::finger::Finger;
 use models::pass::{Pass, coulomb_coefficient};
@@ -92,9 +92,7 @@ pub fn springs(passes: &[Pass], noise: &PassNoise) -> Result<Springs, FingerErro
         .filter(|r| r.condition.amplitude == PeakToPeak::ZERO || r.condition.check().is_ok())
         .collect();
     let vibrating = rows.iter().filter(|r| r.condition.amplitude != PeakToPeak::ZERO).count();
-    if vibrating < FEWEST {
-        return Err(FingerError::TooFew { what: "passes with vibration", found: vibrating, needed: FEWEST });
-    }
+    enough("passes with vibration", vibrating, FEWEST)?;
     // A coarse look at the whole range, then the best three places.
     let [ratios, stiffnesses] = [RATIO_RANGE, STIFFNESS_RANGE_N_PER_M].map(|range| range.map(f64::ln));
     let place = |range: [f64; 2], k: usize, n: usize| range[0] + (range[1] - range[0]) * k as f64 / n as f64;
@@ -239,14 +237,8 @@ fn profile_end(rows: &[Row], best: Found, axis: usize, end: f64, outwards: f64, 
     let (mut inside, mut step) = (best, 0.01);
     loop {
         let next = inside.at[axis] + outwards * step;
-        if (end - next) * outwards <= 0.0 {
-            let last = at(end, inside);
-            if last.chi2 <= allowed {
-                return (end, false);
-            }
-        }
-        let place = if (end - next) * outwards <= 0.0 { end } else { next };
-        let there = at(place, inside);
+        let is_last = (end - next) * outwards <= 0.0;
+        let there = at(if is_last { end } else { next }, inside);
         if there.chi2 > allowed {
             let (mut low, mut high) = (inside, there.at[axis]);
             for _ in 0..20 {
@@ -254,6 +246,9 @@ fn profile_end(rows: &[Row], best: Found, axis: usize, end: f64, outwards: f64, 
                 if middle.chi2 > allowed { high = middle.at[axis] } else { low = middle }
             }
             return (0.5 * (low.at[axis] + high), true);
+        }
+        if is_last {
+            return (end, false);
         }
         (inside, step) = (there, 1.6 * step);
     }

@@ -1,7 +1,7 @@
 //! Normal and lateral stiffness, quasi-static and at ultrasonic frequencies.
 
-use super::FingerError;
-use crate::regression::linear;
+use super::{FingerError, enough};
+use crate::regression::{ends, linear};
 use crate::uncertainty::student::coverage_factor;
 use nalgebra::{DMatrix, DVector};
 
@@ -37,12 +37,8 @@ pub fn quasi_static(
     at_m: f64,
     scale_relative_sd: f64,
 ) -> Result<Stiffness, FingerError> {
-    const NEEDED: usize = 8;
-    if points.len() < NEEDED {
-        return Err(FingerError::TooFew { what: "points of the loop", found: points.len(), needed: NEEDED });
-    }
-    let range_m =
-        points.iter().fold([f64::INFINITY, f64::NEG_INFINITY], |[a, b], p| [a.min(p.0), b.max(p.0)]);
+    enough("points of the loop", points.len(), 8)?;
+    let range_m = ends(points.iter().map(|p| p.0));
     let (middle, half) = (0.5 * (range_m[0] + range_m[1]), 0.5 * (range_m[1] - range_m[0]));
     let both = points.iter().any(|p| p.2) && points.iter().any(|p| !p.2);
     let columns = if both { 4 } else { 3 };
@@ -59,10 +55,9 @@ pub fn quasi_static(
     // A parabolic opening of half height h encloses (8/3) h half; a linear viscoelastic ellipse of loss
     // tangent d encloses pi k half^2 d.
     let per_height = 8.0 / (3.0 * std::f64::consts::PI * k * half);
-    let loss_tangent = if both {
-        [(per_height * fit.estimates[3]).abs(), per_height * fit.standard_uncertainty(3)]
-    } else {
-        [0.0, 0.0]
+    let loss_tangent = match both {
+        true => [(per_height * fit.estimates[3]).abs(), per_height * fit.standard_uncertainty(3)],
+        false => [0.0; 2],
     };
     let statistical = fit.standard_uncertainty(1);
     let u = statistical.hypot(k * scale_relative_sd);
@@ -100,11 +95,8 @@ pub fn ultrasonic(
     normal_force_n: f64,
     scale_relative_sd: f64,
 ) -> Result<Stiffness, FingerError> {
-    const NEEDED: usize = 4;
-    if points.len() < NEEDED {
-        return Err(FingerError::TooFew { what: "amplitudes", found: points.len(), needed: NEEDED });
-    }
     let n = points.len();
+    enough("amplitudes", n, 4)?;
     let design = DMatrix::from_fn(n, 1, |i, _| points[i].amplitude_m);
     let part = |f: &dyn Fn(&UltrasonicPoint) -> f64| {
         linear::ordinary(&design, &DVector::from_iterator(n, points.iter().map(f)))
@@ -115,9 +107,7 @@ pub fn ultrasonic(
     if k <= 0.0 {
         return Err(FingerError::Negative("ultrasonic"));
     }
-    let range_m = points
-        .iter()
-        .fold([f64::INFINITY, f64::NEG_INFINITY], |[a, b], p| [a.min(p.amplitude_m), b.max(p.amplitude_m)]);
+    let range_m = ends(points.iter().map(|p| p.amplitude_m));
     let limit_m = normal_force_n / k.hypot(loss);
     if range_m[1] > limit_m {
         return Err(FingerError::ContactLost { amplitude_pp_m: 2.0 * range_m[1], limit_m });

@@ -7,6 +7,7 @@ use super::{AXES, Axis};
 use crate::certificate::{
     BudgetLine, CertificateKind, Finding, Outcome, Parameter, Refusal, Residuals, Verified, parameters,
 };
+use models::rig_file::Calibration;
 use nalgebra::{Matrix2, Vector2};
 use std::collections::BTreeMap;
 
@@ -212,30 +213,18 @@ impl ForceCalibration {
         (0..2).all(|a| (self.range_n[a][0]..=self.range_n[a][1]).contains(&force_n[a]))
     }
 
-    /// Relative standard uncertainty of the gains, lateral and normal, and standard uncertainty of the two
-    /// cross-talks: what the diagnosis takes as priors.
-    pub fn priors(&self) -> ForcePriors {
+    /// Takes what remains uncertain of the gains (relative) and of the two cross-talks (N/N) into what the
+    /// diagnosis knows: standard uncertainties.
+    pub fn take_into(&self, known: &mut Calibration) {
         let g = |i: usize, j: usize| self.gain[(i, j)];
         let c = |i: usize, j: usize| self.gain_covariance[(i, j)];
         let ratio = |top: usize, bottom: usize, t: f64, b: f64| {
             let r = t / b;
             ((c(top, top) - 2.0 * r * c(top, bottom) + r * r * c(bottom, bottom)) / (b * b)).max(0.0).sqrt()
         };
-        ForcePriors {
-            lateral_gain_sd: c(0, 0).sqrt() / g(0, 0).abs(),
-            normal_gain_sd: c(3, 3).sqrt() / g(1, 1).abs(),
-            cross_talk_sd: [ratio(1, 0, g(0, 1), g(0, 0)), ratio(2, 3, g(1, 0), g(1, 1))],
-        }
+        known.lateral_gain_sd = Some(c(0, 0).sqrt() / g(0, 0).abs());
+        known.normal_gain_sd = Some(c(3, 3).sqrt() / g(1, 1).abs());
+        known.crosstalk_sd = Some(ratio(1, 0, g(0, 1), g(0, 0)));
+        known.crosstalk_onto_normal_sd = Some(ratio(2, 3, g(1, 0), g(1, 1)));
     }
-}
-
-/// What remains uncertain of a calibrated force sensor.
-#[derive(Clone, Copy, Debug, PartialEq)]
-pub struct ForcePriors {
-    /// Relative standard uncertainty of the lateral gain.
-    pub lateral_gain_sd: f64,
-    /// Relative standard uncertainty of the normal gain.
-    pub normal_gain_sd: f64,
-    /// Standard uncertainty of the cross-talk of normal onto lateral and of lateral onto normal, N/N.
-    pub cross_talk_sd: [f64; 2],
 }

@@ -1,7 +1,7 @@
 //! Creep: how a reading goes on changing under a load that does not.
 
-use crate::regression::nonlinear::{Scatter, fit};
-use crate::regression::{Fit, FitError};
+use crate::regression::FitError;
+use crate::regression::nonlinear::best;
 
 /// Creep of one channel after a load: `c(t) = c_0 (1 + a (1 - exp(-t / tau)))`.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -32,16 +32,8 @@ impl Creep {
             g[2] = -b[1] * e * t / tau;
             b[0] + b[1] * (1.0 - e)
         };
-        let candidates: Vec<Fit> = [0.05, 0.2, 0.6]
-            .iter()
-            .filter_map(|share| {
-                fit(&model, net_counts, Scatter::Unknown, &[first, last - first, (share * end).ln()]).ok()
-            })
-            .collect();
-        let best = candidates
-            .into_iter()
-            .min_by(|a, b| a.residual_sum_of_squares.total_cmp(&b.residual_sum_of_squares))
-            .ok_or(FitError::NotConverged { iterations: 0 })?;
+        let start = |share: f64| [first, last - first, (share * end).ln()];
+        let best = best(&model, net_counts, [0.05, 0.2, 0.6].map(start), |_| true)?;
         let (c0, amount, tau) = (best.estimates[0], best.estimates[1], best.estimates[2].exp());
         let relative = amount / c0;
         let u = best.standard_uncertainty_along(&[-relative / c0, 1.0 / c0, 0.0]);

@@ -1,6 +1,6 @@
 //! Dynamics of a force channel: bandwidth and delay from a step, resonance of the mount from a tap.
 
-use crate::regression::nonlinear::{Scatter, fit};
+use crate::regression::nonlinear::best;
 use crate::regression::{Fit, FitError};
 use std::f64::consts::PI;
 
@@ -48,9 +48,8 @@ pub fn step_response(time_s: &[f64], samples: &[f64], step_at_s: f64) -> Result<
     let half = half.max(0.5 / rate);
     // Parameters: base, height, delay, ln natural angular frequency, damping ratio.
     let model = |i: usize, b: &[f64], g: &mut [f64]| {
-        let value =
-            |b: &[f64]| b[0] + b[1] * second_order_step(time_s[i] - step_at_s - b[2], b[3].exp(), b[4]);
-        let r = second_order_step(time_s[i] - step_at_s - b[2], b[3].exp(), b[4]);
+        let response = |b: &[f64]| second_order_step(time_s[i] - step_at_s - b[2], b[3].exp(), b[4]);
+        let (value, r) = (|b: &[f64]| b[0] + b[1] * response(b), response(b));
         (g[0], g[1]) = (1.0, r);
         let mut moved = b.to_vec();
         for (k, h) in [(2, 1e-6 / b[3].exp()), (3, 1e-6), (4, 1e-6)] {
@@ -62,16 +61,12 @@ pub fn step_response(time_s: &[f64], samples: &[f64], step_at_s: f64) -> Result<
         }
         b[0] + b[1] * r
     };
-    let best = [(0.2, 0.7), (0.5, 0.7), (0.8, 0.7), (0.5, 0.3), (0.5, 1.2)]
-        .iter()
-        .filter_map(|(share, zeta): &(f64, f64)| {
-            // A critically damped step is half way after 1.7 / omega.
-            let omega: f64 = 1.7 / ((1.0 - share) * half);
-            fit(&model, samples, Scatter::Unknown, &[low, high - low, share * half, omega.ln(), *zeta]).ok()
-        })
-        .filter(|f: &Fit| f.estimates[4] > 0.0 && f.estimates[2] > -2.0 / rate)
-        .min_by(|a, b| a.residual_sum_of_squares.total_cmp(&b.residual_sum_of_squares))
-        .ok_or(FitError::NotConverged { iterations: 0 })?;
+    // A critically damped step is half way after 1.7 / omega.
+    let omega = |share: f64| 1.7 / ((1.0 - share) * half);
+    let starts = [(0.2, 0.7), (0.5, 0.7), (0.8, 0.7), (0.5, 0.3), (0.5, 1.2)]
+        .map(|(share, zeta)| [low, high - low, share * half, omega(share).ln(), zeta]);
+    let possible = |f: &Fit| f.estimates[4] > 0.0 && f.estimates[2] > -2.0 / rate;
+    let best = best(&model, samples, starts, possible)?;
     let (omega, zeta) = (best.estimates[3].exp(), best.estimates[4]);
     let ratio = bandwidth_ratio(zeta);
     let natural = omega / (2.0 * PI);
@@ -155,16 +150,9 @@ pub fn ring_down(time_s: &[f64], samples: &[f64]) -> Result<RingDown, FitError> 
         g[4] = -t * decay * wave;
         b[0] + decay * wave
     };
-    let best = [0.01, 0.03, 0.1, 0.3]
-        .iter()
-        .filter_map(|zeta| {
-            let omega = 2.0 * PI * guess_hz;
-            let start = [mean, samples[0] - mean, 0.0, omega, zeta * omega];
-            fit(&model, samples, Scatter::Unknown, &start).ok()
-        })
-        .filter(|f| f.estimates[3] > 0.0 && f.estimates[4] > 0.0)
-        .min_by(|a, b| a.residual_sum_of_squares.total_cmp(&b.residual_sum_of_squares))
-        .ok_or(FitError::NotConverged { iterations: 0 })?;
+    let omega = 2.0 * PI * guess_hz;
+    let starts = [0.01, 0.03, 0.1, 0.3].map(|zeta| [mean, samples[0] - mean, 0.0, omega, zeta * omega]);
+    let best = best(&model, samples, starts, |f| f.estimates[3] > 0.0 && f.estimates[4] > 0.0)?;
     let (damped, sigma) = (best.estimates[3], best.estimates[4]);
     let natural = damped.hypot(sigma);
     let n3 = natural.powi(3);

@@ -10,7 +10,7 @@ mod judge;
 
 use super::series::{LoadReading, Weighing};
 use super::{AXES, Axis};
-use crate::regression::{FitError, linear};
+use crate::regression::{FitError, ends, linear};
 use nalgebra::{DMatrix, DVector, Matrix2};
 
 /// What the model may contain.
@@ -187,14 +187,9 @@ pub fn fit(readings: &[LoadReading], weighing: &Weighing, options: &Options) -> 
     let x = DMatrix::from_fn(readings.len(), design.terms.len(), |i, k| {
         design.entry(&readings[i], design.terms[k])
     });
-    let channels = AXES.map(|a| {
-        linear::ordinary(
-            &x,
-            &DVector::from_iterator(readings.len(), readings.iter().map(|r| r.counts[a as usize])),
-        )
-    });
-    let [lateral, normal] = channels;
-    let fits = [lateral?, normal?];
+    let counts = |a: Axis| DVector::from_fn(readings.len(), |i, _| readings[i].counts[a as usize]);
+    let channel = |a: Axis| linear::ordinary(&x, &counts(a));
+    let fits = [channel(Axis::Lateral)?, channel(Axis::Normal)?];
     let dof = fits[0].degrees_of_freedom;
     let scatter = Matrix2::from_fn(|a, b| fits[a].residuals.dot(&fits[b].residuals) / dof);
     let p = design.terms.len();
@@ -210,7 +205,7 @@ pub fn fit(readings: &[LoadReading], weighing: &Weighing, options: &Options) -> 
         residuals: (0..readings.len()).map(|i| [fits[0].residuals[i], fits[1].residuals[i]]).collect(),
         lack_of_fit_p: None,
         range_n: AXES
-            .map(|a| range(readings.iter().filter(|r| r.axis == Some(a)).map(|r| r.load_n).chain([0.0]))),
+            .map(|a| ends(readings.iter().filter(|r| r.axis == Some(a)).map(|r| r.load_n).chain([0.0]))),
         temperature_c: design.temperature_c,
         readings: readings.len(),
         terms: design.terms.clone(),
@@ -243,7 +238,7 @@ impl Design {
         }
         let temperatures: Option<Vec<f64>> = readings.iter().map(|r| r.temperature_c).collect();
         let temperature_c = temperatures.map(|t| {
-            let [low, high] = range(t.iter().copied());
+            let [low, high] = ends(t.iter().copied());
             [t.iter().sum::<f64>() / t.len() as f64, low, high]
         });
         if temperature_c.is_some_and(|[_, low, high]| high - low >= options.temperature_spread_k) {
@@ -276,10 +271,6 @@ impl Design {
             Term::GainTemperature(axis) => load(axis) * kelvin(),
         }
     }
-}
-
-fn range(values: impl Iterator<Item = f64>) -> [f64; 2] {
-    values.fold([f64::INFINITY, f64::NEG_INFINITY], |[low, high], x| [low.min(x), high.max(x)])
 }
 
 fn type_b(fit: &ForceFit, weighing: &Weighing) -> DMatrix<f64> {

@@ -2,6 +2,7 @@
 
 use super::RepeatedShift;
 use crate::certificate::{BudgetLine, CertificateKind, Finding, Outcome, Residuals, parameters};
+use crate::regression::ends;
 use models::quantity::PeakToPeak;
 use nalgebra::DMatrix;
 use std::collections::BTreeMap;
@@ -31,8 +32,7 @@ pub fn outcome(found: &[(PeakToPeak, RepeatedShift)], at: &Acquisition) -> Outco
     let covariance = DMatrix::from_fn(found.len(), found.len(), |i, j| {
         if i == j { found[i].1.phase_deg.standard_uncertainty.powi(2) } else { common }
     });
-    let range =
-        found.iter().fold([f64::INFINITY, 0f64], |[a, b], (w, _)| [a.min(w.metres()), b.max(w.metres())]);
+    let range = ends(found.iter().map(|(w, _)| w.metres()));
     let largest = found.iter().map(|(_, f)| f.repeat_sd_deg).fold(0.0, f64::max);
     let mut remarks: Vec<String> = found
         .iter()

@@ -5,9 +5,10 @@ use serde::{Deserialize, Serialize};
 use std::io::{Read, Write};
 
 /// One row: the phase shift at one amplitude.
-#[derive(Clone, Debug, PartialEq)]
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 pub struct PhasePoint {
     /// Peak-to-peak amplitude.
+    #[serde(rename = "amplitude_pp_m")]
     pub amplitude: PeakToPeak,
     /// Phase shift of Eq. 1 in degrees, [0, 360).
     pub phase_shift_deg: f64,
@@ -21,17 +22,6 @@ pub struct PhasePoint {
     pub frequency_hz: Option<f64>,
     /// Normal force in N.
     pub normal_force_n: Option<f64>,
-}
-
-#[derive(Serialize, Deserialize)]
-struct Row {
-    amplitude_pp_m: f64,
-    phase_shift_deg: f64,
-    phase_shift_sd_deg: Option<f64>,
-    repeats: Option<u32>,
-    condition: Option<String>,
-    frequency_hz: Option<f64>,
-    normal_force_n: Option<f64>,
 }
 
 /// Why a table cannot be read or written.
@@ -57,9 +47,10 @@ pub fn read_phases(input: impl Read) -> Result<Vec<PhasePoint>, TableError> {
         let record = record.map_err(|e| TableError { line: at(&e), reason: e.to_string() })?;
         let line = record.position().map_or(0, csv::Position::line);
         let fail = |reason: String| TableError { line, reason };
-        let row: Row = record.deserialize(Some(&headers)).map_err(|e| fail(e.to_string()))?;
-        if !(row.amplitude_pp_m.is_finite() && row.amplitude_pp_m >= 0.0) {
-            return Err(fail(format!("amplitude_pp_m = {} is not an amplitude", row.amplitude_pp_m)));
+        let row: PhasePoint = record.deserialize(Some(&headers)).map_err(|e| fail(e.to_string()))?;
+        let w = row.amplitude.metres();
+        if !(w.is_finite() && w >= 0.0) {
+            return Err(fail(format!("amplitude_pp_m = {w} is not an amplitude")));
         }
         if !(0.0..360.0).contains(&row.phase_shift_deg) {
             return Err(fail(format!("phase_shift_deg = {} is not in [0, 360)", row.phase_shift_deg)));
@@ -67,15 +58,7 @@ pub fn read_phases(input: impl Read) -> Result<Vec<PhasePoint>, TableError> {
         if row.phase_shift_sd_deg.is_some_and(|sd| !(sd.is_finite() && sd >= 0.0)) {
             return Err(fail("phase_shift_sd_deg is negative or not a number".into()));
         }
-        points.push(PhasePoint {
-            amplitude: PeakToPeak::from_metres(row.amplitude_pp_m),
-            phase_shift_deg: row.phase_shift_deg,
-            phase_shift_sd_deg: row.phase_shift_sd_deg,
-            repeats: row.repeats,
-            condition: row.condition.filter(|c| !c.is_empty()),
-            frequency_hz: row.frequency_hz,
-            normal_force_n: row.normal_force_n,
-        });
+        points.push(row);
     }
     Ok(points)
 }
@@ -87,16 +70,7 @@ pub fn read_phases(input: impl Read) -> Result<Vec<PhasePoint>, TableError> {
 pub fn write_phases(output: impl Write, points: &[PhasePoint]) -> Result<(), TableError> {
     let mut writer = csv::Writer::from_writer(output);
     for (i, p) in points.iter().enumerate() {
-        let row = Row {
-            amplitude_pp_m: p.amplitude.metres(),
-            phase_shift_deg: p.phase_shift_deg,
-            phase_shift_sd_deg: p.phase_shift_sd_deg,
-            repeats: p.repeats,
-            condition: p.condition.clone(),
-            frequency_hz: p.frequency_hz,
-            normal_force_n: p.normal_force_n,
-        };
-        writer.serialize(row).map_err(|e| TableError { line: i as u64 + 2, reason: e.to_string() })?;
+        writer.serialize(p).map_err(|e| TableError { line: i as u64 + 2, reason: e.to_string() })?;
     }
     writer.flush().map_err(|e| TableError { line: 0, reason: e.to_string() })
 }

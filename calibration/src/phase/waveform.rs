@@ -1,7 +1,7 @@
 //! From two velocity waveforms to one phase shift.
 
 use crate::amplitude::vibrometer::Decoder;
-use crate::regression::{Fit, FitError, linear};
+use crate::regression::{Fit, FitError, ends, linear};
 use nalgebra::{DMatrix, DVector};
 use std::f64::consts::PI;
 
@@ -87,12 +87,8 @@ pub fn shift(w: &Waveforms) -> Result<Shift, PhaseError> {
     let plate = spectrum("plate", &w.plate_v[..n], w, w.plate, harmonics)?;
     let skin = spectrum("skin", &w.skin_v[..n], w, w.skin, harmonics)?;
     let variance = |s: &Spectrum, which: &dyn Fn(usize) -> bool| {
-        s.parts
-            .iter()
-            .enumerate()
-            .filter(|(k, _)| which(*k))
-            .map(|(_, p)| p[0] * p[0] + p[1] * p[1])
-            .sum::<f64>()
+        let lines = s.parts.iter().enumerate().filter(|(k, _)| which(*k));
+        lines.map(|(_, p)| p[0] * p[0] + p[1] * p[1]).sum::<f64>()
     };
     let odd = |k: usize| k % 2 == 1;
     let all = variance(&skin, &|_| true);
@@ -122,11 +118,7 @@ fn spectrum(
     decoder: &Decoder,
     harmonics: usize,
 ) -> Result<Spectrum, PhaseError> {
-    for extreme in [f64::INFINITY, f64::NEG_INFINITY] {
-        let top = volts
-            .iter()
-            .copied()
-            .fold(-extreme, |m, x| if extreme > 0.0 { f64::max(m, x) } else { f64::min(m, x) });
+    for top in ends(volts.iter().copied()) {
         // A clipped wave stays at its extreme for several samples in a row, period after period.
         let flat = volts.windows(3).filter(|v| v.iter().all(|x| *x == top)).count();
         if flat > 3 {

@@ -4,7 +4,7 @@
 //! Why: normal equations square the condition number of a design. With 2^-104 of relative precision even
 //! a condition of 1e10 squared leaves 11 digits, and the solver stays a plain Cholesky.
 
-use std::ops::{Add, Div, Mul, Neg, Sub};
+use std::ops::{Add, Div, Mul, Sub};
 
 /// An unevaluated sum `hi + lo` with `|lo| <= ulp(hi) / 2`.
 #[derive(Clone, Copy, Debug, PartialEq, Default)]
@@ -67,17 +67,10 @@ impl Add for DoubleDouble {
     }
 }
 
-impl Neg for DoubleDouble {
-    type Output = Self;
-    fn neg(self) -> Self {
-        DoubleDouble { hi: -self.hi, lo: -self.lo }
-    }
-}
-
 impl Sub for DoubleDouble {
     type Output = Self;
     fn sub(self, other: Self) -> Self {
-        self + -other
+        self + DoubleDouble { hi: -other.hi, lo: -other.lo }
     }
 }
 

@@ -3,45 +3,32 @@
 use super::{Fit, FitError};
 use nalgebra::{DMatrix, DVector};
 
-/// The scatter of the observations.
-#[derive(Clone, Copy, Debug)]
-pub enum Scatter<'a> {
-    /// Equal and unknown: estimated from the residuals.
-    Unknown,
-    /// One known standard deviation for each observation.
-    Known(&'a [f64]),
-}
-
 /// A model evaluated at one observation: given its index and the parameters, it returns the value and
 /// writes the derivatives by the parameters.
 pub type Model<'a> = dyn Fn(usize, &[f64], &mut [f64]) -> f64 + 'a;
 
-/// Fit `observations[i] = model(i, b) + e` from a starting point.
+/// Fits `observations[i] = model(i, b) + e` from a starting point; the scatter of `e`, equal for all, is
+/// estimated from the residuals.
 ///
-/// Converges to the nearest minimum: a caller with several candidates starts from each and keeps the best.
+/// Converges to the nearest minimum: where there may be several, [`best`] starts from several points.
 ///
 /// # Errors
 /// Too few observations, parameters that the data does not determine, values not finite, no convergence.
-pub fn fit(model: &Model, observations: &[f64], scatter: Scatter, start: &[f64]) -> Result<Fit, FitError> {
+pub fn fit(model: &Model, observations: &[f64], start: &[f64]) -> Result<Fit, FitError> {
     const ITERATIONS: usize = 20_000;
     let (n, p) = (observations.len(), start.len());
-    let needed = if matches!(scatter, Scatter::Unknown) { p + 1 } else { p };
-    if n < needed {
+    if n <= p {
         return Err(FitError::TooFew { observations: n, parameters: p });
     }
-    let weight = |i: usize| match scatter {
-        Scatter::Unknown => 1.0,
-        Scatter::Known(sd) => 1.0 / sd[i],
-    };
     let evaluate = |b: &DVector<f64>| {
         let mut residuals = DVector::zeros(n);
         let mut jacobian = DMatrix::zeros(n, p);
         let mut gradient = vec![0.0; p];
         for i in 0..n {
             let value = model(i, b.as_slice(), &mut gradient);
-            residuals[i] = (observations[i] - value) * weight(i);
+            residuals[i] = observations[i] - value;
             for j in 0..p {
-                jacobian[(i, j)] = gradient[j] * weight(i);
+                jacobian[(i, j)] = gradient[j];
             }
         }
         (residuals, jacobian)
@@ -92,10 +79,25 @@ pub fn fit(model: &Model, observations: &[f64], scatter: Scatter, start: &[f64])
         }
         // Four steps without progress: the rest is for the undamped steps of `polish`.
         if settled >= 4 || (settled >= 3 && small) || sum == 0.0 {
-            return polish(b, r, j, scatter, &evaluate);
+            return polish(b, r, j, &evaluate);
         }
     }
     Err(FitError::NotConverged { iterations: ITERATIONS })
+}
+
+/// The best fit among those from several starting points that `wanted` takes.
+///
+/// # Errors
+/// There is none.
+pub fn best<const N: usize>(
+    model: &Model,
+    observations: &[f64],
+    starts: impl IntoIterator<Item = [f64; N]>,
+    wanted: impl Fn(&Fit) -> bool,
+) -> Result<Fit, FitError> {
+    let fits = starts.into_iter().filter_map(|start| fit(model, observations, &start).ok()).filter(wanted);
+    fits.min_by(|a, b| a.residual_sum_of_squares.total_cmp(&b.residual_sum_of_squares))
+        .ok_or(FitError::NotConverged { iterations: 0 })
 }
 
 fn damped_step(j: &DMatrix<f64>, r: &DVector<f64>, scale: &[f64], damping: f64) -> DVector<f64> {
@@ -122,7 +124,6 @@ fn polish(
     mut b: DVector<f64>,
     mut r: DVector<f64>,
     mut j: DMatrix<f64>,
-    scatter: Scatter,
     evaluate: &impl Fn(&DVector<f64>) -> (DVector<f64>, DMatrix<f64>),
 ) -> Result<Fit, FitError> {
     let mut last = f64::INFINITY;
@@ -148,13 +149,8 @@ fn polish(
         newton = super::linear::unit_variance(&j, &r)?;
     }
     let (n, p) = j.shape();
-    let mut covariance = newton.covariance;
     let degrees_of_freedom = (n - p) as f64;
     let residual_sum_of_squares = r.norm_squared();
-    let mut residuals = r;
-    match scatter {
-        Scatter::Unknown => covariance *= residual_sum_of_squares / degrees_of_freedom,
-        Scatter::Known(sd) => residuals.iter_mut().zip(sd).for_each(|(r, sd)| *r *= sd),
-    }
-    Ok(Fit { estimates: b, covariance, residuals, residual_sum_of_squares, degrees_of_freedom })
+    let covariance = newton.covariance * (residual_sum_of_squares / degrees_of_freedom);
+    Ok(Fit { estimates: b, covariance, residuals: r, residual_sum_of_squares, degrees_of_freedom })
 }

@@ -12,9 +12,19 @@ pub fn coverage_factor(coverage: f64, degrees_of_freedom: f64) -> f64 {
     StudentsT::new(0.0, 1.0, degrees_of_freedom.max(1.0)).map_or(f64::NAN, |t| t.inverse_cdf(p))
 }
 
-/// Probability of an F ratio at least as large, where the hypothesis of no difference holds.
-pub fn f_test_p_value(ratio: f64, numerator_dof: f64, denominator_dof: f64) -> f64 {
-    FisherSnedecor::new(numerator_dof, denominator_dof).map_or(f64::NAN, |f| f.sf(ratio.max(0.0)))
+/// F test of a model with so many parameters by its residuals, a group for the replicates at each place: the
+/// probability, where it holds, of such means beside the scatter within groups; `None` with too few replicates.
+pub fn lack_of_fit(groups: &[Vec<f64>], parameters: usize) -> Option<f64> {
+    let (mut between, mut within, mut count) = (0.0, 0.0, 0);
+    for group in groups {
+        let mean = group.iter().sum::<f64>() / group.len() as f64;
+        between += group.len() as f64 * mean * mean;
+        within += group.iter().map(|r| (r - mean).powi(2)).sum::<f64>();
+        count += group.len();
+    }
+    let (b, w) = (groups.len() as f64 - parameters as f64, (count - groups.len()) as f64);
+    let p_value = |ratio: f64| FisherSnedecor::new(b, w).map_or(f64::NAN, |f| f.sf(ratio.max(0.0)));
+    (b >= 1.0 && w >= 3.0).then(|| p_value(between / b / (within / w)))
 }
 
 #[cfg(test)]

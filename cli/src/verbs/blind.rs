@@ -33,10 +33,8 @@ pub struct Args {
     pub verbose: bool,
 }
 
-/// Makes, diagnoses and scores the sets.
-///
-/// # Errors
-/// No thread or no signals for Ctrl-C, a set that cannot be made or written.
+/// Makes, diagnoses and scores the sets; fails without thread or signals for Ctrl-C, and on a set that cannot
+/// be made or written.
 pub fn run(args: Args, json: bool) -> miette::Result<ExitCode> {
     let stratum = args.of.stratum;
     if let Some(folder) = &args.write {
@@ -133,12 +131,8 @@ fn tell(scored: &[Scored], seed: u64, sets: usize, partial: bool, json: bool) ->
         out!("\nentries of the lists, {title}: stated probability, share that is right");
         for b in bins {
             let ([from, to], [low, high]) = (b.from_to, b.ci95);
-            out!(
-                "  {from:5.3} to {to:5.3}  {:.4}  {:.4} [{low:.4}, {high:.4}]  n {}",
-                b.stated,
-                b.observed,
-                b.entries
-            );
+            let (stated, right, n) = (b.stated, b.observed, b.entries);
+            out!("  {from:5.3} to {to:5.3}  {stated:.4}  {right:.4} [{low:.4}, {high:.4}]  n {n}");
         }
     }
     Ok(())

@@ -28,10 +28,8 @@ struct PriorsArgs {
     certificates: Vec<PathBuf>,
 }
 
-/// Calibrates.
-///
-/// # Errors
-/// Data that is unfit for a certificate, with the reason; files that cannot be read or written.
+/// Calibrates; refused: data that is unfit for a certificate, with the reason; files that cannot be read or
+/// written.
 pub fn run(args: Args, json: bool) -> miette::Result<ExitCode> {
     match &args.verb {
         Verb::Priors(args) => priors(args, json),
@@ -77,12 +75,8 @@ fn priors(args: &PriorsArgs, json: bool) -> miette::Result<ExitCode> {
     if priors == Default::default() {
         say!("none of these certificates bounds an error of the rig: [calibration] stays empty");
     }
-    if json {
-        answer_json(&json!({ "calibration": priors }));
-    } else {
-        out!("[calibration]\n{}", toml::to_string(&priors).into_diagnostic()?.trim_end());
-    }
-    exit(DONE)
+    let text = toml::to_string(&priors).into_diagnostic()?;
+    answered(json, &json!({ "calibration": priors }), format!("[calibration]\n{}", text.trim_end()))
 }
 
 fn show(certificate: &Certificate, out: &Path) {

@@ -42,10 +42,8 @@ fn range_of(text: &str) -> Result<Range<u64>, String> {
         .ok_or_else(|| "FIRST..END, as in 0..100 for the first hundred".to_string())
 }
 
-/// Runs the range, or what is missing of the share, unless its shard is there.
-///
-/// # Errors
-/// A task that nobody names, bad cases, a folder of another study, a disk that is full.
+/// Runs the range, or what is missing of the share, unless its shard is there; refused: a task that nobody
+/// names, bad cases, a folder of another study, a disk that is full.
 pub fn run(args: Args, json: bool) -> miette::Result<ExitCode> {
     if args.threads == Some(0) {
         miette::bail!("--threads 0: at least one is needed");

@@ -154,33 +154,44 @@ fn named(given: &[PathBuf], list: Option<&Path>) -> miette::Result<Vec<PathBuf>>
     all.into_iter().map(absolute).collect()
 }
 
+/// A line for each file that was named.
+fn lines<L: Serialize>(
+    given: &[PathBuf],
+    list: Option<&Path>,
+    line: impl Fn(PathBuf) -> L,
+) -> miette::Result<Vec<Value>> {
+    let line = |path| serde_json::to_value(line(path)).into_diagnostic();
+    named(given, list)?.into_iter().map(line).collect()
+}
+
 /// The settings of `--set`.
 pub(crate) fn values(list: &[String]) -> miette::Result<BTreeMap<String, f64>> {
-    let parsed = |text: &String| {
+    named_values("--set", "NAME=VALUE", list, |value| value.trim().parse().ok())
+}
+
+/// What an option states by names, each as `NAME=...`.
+fn named_values<T>(
+    option: &str,
+    form: &str,
+    list: &[String],
+    parsed: impl Fn(&str) -> Option<T>,
+) -> miette::Result<BTreeMap<String, T>> {
+    let entry = |text: &String| {
         let (name, value) = text.split_once('=')?;
-        Some((name.trim().to_string(), value.trim().parse().ok()?))
+        Some((name.trim().to_string(), parsed(value)?))
     };
     list.iter()
-        .map(|text| parsed(text).ok_or_else(|| miette::miette!("--set {text}: NAME=VALUE is needed")))
+        .map(|text| entry(text).ok_or_else(|| miette::miette!("{option} {text}: {form} is needed")))
         .collect()
 }
 
 /// The spans of `--span`.
 pub(crate) fn spans(list: &[String]) -> miette::Result<BTreeMap<String, ridge::Span>> {
-    let parsed = |text: &String| {
-        let (name, rest) = text.split_once('=')?;
-        let (ends, log) = rest.strip_suffix(":log").map_or((rest, false), |ends| (ends, true));
+    named_values("--span", "NAME=LOW..HIGH or NAME=LOW..HIGH:log", list, |text| {
+        let (ends, log) = text.strip_suffix(":log").map_or((text, false), |ends| (ends, true));
         let (low, high) = ends.split_once("..")?;
-        let span = ridge::Span { low: low.trim().parse().ok()?, high: high.trim().parse().ok()?, log };
-        Some((name.trim().to_string(), span))
-    };
-    list.iter()
-        .map(|text| {
-            parsed(text).ok_or_else(|| {
-                miette::miette!("--span {text}: NAME=LOW..HIGH or NAME=LOW..HIGH:log is needed")
-            })
-        })
-        .collect()
+        Some(ridge::Span { low: low.trim().parse().ok()?, high: high.trim().parse().ok()?, log })
+    })
 }
 
 /// The rows of a table of variables.
@@ -217,21 +228,13 @@ fn write(
         None => drop(make(header.cases - 1, None)?),
     }
     file::write(&to.output, header.clone(), lines)?;
-    if json {
-        answer_json(&json!({ "file": to.output, "kind": kind.name, "cases": header.cases }));
-    } else {
-        out!("{}: {} cases: {}", to.output.display(), header.cases, kind.words);
-    }
-    exit(DONE)
+    let document = json!({ "file": to.output, "kind": kind.name, "cases": header.cases });
+    let words = format!("{}: {} cases: {}", to.output.display(), header.cases, kind.words);
+    answered(json, &document, words)
 }
 
-/// Writes a file of cases.
-///
-/// # Errors
-/// What is no case, with the place.
+/// Writes a file of cases; refused: what is no case, with the place.
 pub fn run(args: Args, json: bool) -> miette::Result<ExitCode> {
-    let of =
-        |path: PathBuf, more: &dyn Fn(PathBuf) -> serde_json::Result<Value>| more(path).into_diagnostic();
     match args.what {
         What::Ridge(a) => {
             let steady = Steady { tolerance: a.tolerance, at_most: a.at_most, ..Steady::default() };
@@ -251,16 +254,14 @@ pub fn run(args: Args, json: bool) -> miette::Result<ExitCode> {
         What::Blind(a) => write("blind", &a.to, a.sets, &a.settings, None, json),
         What::Diagnose(a) => {
             let rig = a.rig.map(|p| named(&[p], None)).transpose()?.and_then(|mut all| all.pop());
-            let line = |data| serde_json::to_value(diagnose::Line { data, rig: rig.clone() });
-            let lines = named(&a.data, a.list.as_deref())?.into_iter().map(|p| of(p, &line));
-            let lines: Vec<Value> = lines.collect::<miette::Result<_>>()?;
+            let line = |data| diagnose::Line { data, rig: rig.clone() };
+            let lines = lines(&a.data, a.list.as_deref(), line)?;
             write("diagnose", &a.to, 0, &a.settings, Some(&lines), json)
         }
         What::Finger(a) => {
             let (frequency_hz, normal_force_n) = (a.frequency_hz, a.normal_force_n);
-            let line = |phases| serde_json::to_value(finger::Line { phases, frequency_hz, normal_force_n });
-            let lines = named(&a.phases, a.list.as_deref())?.into_iter().map(|p| of(p, &line));
-            let lines: Vec<Value> = lines.collect::<miette::Result<_>>()?;
+            let line = |phases| finger::Line { phases, frequency_hz, normal_force_n };
+            let lines = lines(&a.phases, a.list.as_deref(), line)?;
             let settings = finger::Settings {
                 elements: a.elements,
                 modulus_only: a.modulus_only,

@@ -22,10 +22,8 @@ pub struct Args {
     offline: bool,
 }
 
-/// Checks every file, and every plan against the setup; the status tells of the worst.
-///
-/// # Errors
-/// A setup or a model that was named and cannot be used; what is wrong with the files is the answer.
+/// Checks every file, and every plan against the setup; the status tells of the worst. What is wrong with the
+/// files is the answer; a setup or a model that was named and cannot be used is a refusal.
 pub fn run(args: Args, json: bool) -> miette::Result<ExitCode> {
     let named = args.setup.as_deref().map(super::setup).transpose()?;
     let among = args.files.iter().filter(|f| kind_of(f).is_ok_and(|k| k == "setup"));

@@ -30,10 +30,8 @@ pub struct Args {
     report: Option<PathBuf>,
 }
 
-/// Compares.
-///
-/// # Errors
-/// A folder that holds no run, a run without a pass without vibration, a page that cannot be written.
+/// Compares; refused: a folder that holds no run, a run without a pass without vibration, a page that cannot
+/// be written.
 pub fn run(args: &Args, json: bool) -> miette::Result<ExitCode> {
     super::there(&args.run_a, "run")?;
     super::there(&args.run_b, "run")?;
@@ -45,12 +43,7 @@ pub fn run(args: &Args, json: bool) -> miette::Result<ExitCode> {
         runs::files::write_output(page, runs::report::comparison::page(&compared)?)?;
         say!("report: {} (the dashboard compares two runs by itself)", page.display());
     }
-    if json {
-        answer_json(&json!(compared));
-    } else {
-        out!("{}", folded(&terminal(&compared), 2));
-    }
-    exit(DONE)
+    answered(json, &json!(compared), folded(&terminal(&compared), 2))
 }
 
 /// Compares more than two runs, or two groups of them.
@@ -65,18 +58,13 @@ fn run_groups(args: &Args, json: bool) -> miette::Result<ExitCode> {
         runs::files::write_output(page, runs::report::groups::page(&grouped)?)?;
         say!("report: {}", page.display());
     }
-    if json {
-        answer_json(&json!(grouped));
-        return exit(DONE);
-    }
     let mut text = grouped.warnings.iter().map(|w| format!("note: {w}\n")).collect::<String>();
     let _ = writeln!(text, "{}", grouped.words());
     for group in &grouped.groups {
         let mu0: Vec<String> = group.mu0.iter().map(|mu0| format!("{mu0:.3}")).collect();
         let _ = writeln!(text, "{}: runs {}, mu_0 {}", group.name, group.runs.len(), mu0.join(", "));
     }
-    out!("{}", folded(text.trim_end(), 2));
-    exit(DONE)
+    answered(json, &json!(grouped), folded(text.trim_end(), 2))
 }
 
 fn terminal(Compared { comparison: result, warnings: warned, differences: differ, .. }: &Compared) -> String {
@@ -92,15 +80,8 @@ fn terminal(Compared { comparison: result, warnings: warned, differences: differ
             let _ = writeln!(w, "{}\n{first}\n{second}", judged.answer_words(result.pairs.len()));
         }
     }
-    let [a, b] = result.references;
-    let _ = writeln!(
-        w,
-        "mu_0: {:.3} \u{b1} {:.3} and {:.3} \u{b1} {:.3}",
-        a.mu0,
-        a.mu0 * a.relative_sd,
-        b.mu0,
-        b.mu0 * b.relative_sd
-    );
+    let [a, b] = result.references.map(|r| format!("{:.3} \u{b1} {:.3}", r.mu0, r.mu0 * r.relative_sd));
+    let _ = writeln!(w, "mu_0: {a} and {b}");
     let [left, right] = result.unpaired;
     if left + right > 0 {
         let _ = writeln!(w, "passes at conditions that the other run lacks: {left} and {right}");
@@ -124,8 +105,8 @@ fn terminal(Compared { comparison: result, warnings: warned, differences: differ
             p.deviations()
         );
     }
-    let _ =
-        writeln!(w, "settings that differ: {}", if differ.is_empty() { "none in the records" } else { "" });
+    let none = if differ.is_empty() { "none in the records" } else { "" };
+    let _ = writeln!(w, "settings that differ: {none}");
     let shown = |value: &Option<String>| match value.as_ref().map(|v| (v, v.parse::<f64>())) {
         None => "none".to_string(),
         Some((_, Ok(value))) if value.fract() != 0.0 => human::number(value),

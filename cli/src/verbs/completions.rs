@@ -14,10 +14,5 @@ pub fn run(args: &Args, command: &mut clap::Command, json: bool) -> miette::Resu
     let mut script = Vec::new();
     clap_complete::generate(args.shell, command, "muprime", &mut script);
     let text = String::from_utf8_lossy(&script);
-    if json {
-        answer_json(&json!({ "shell": args.shell.to_string(), "text": text }));
-    } else {
-        out!("{}", text.trim_end());
-    }
-    exit(DONE)
+    answered(json, &json!({ "shell": args.shell.to_string(), "text": text }), text.trim_end())
 }

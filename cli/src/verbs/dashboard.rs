@@ -36,20 +36,14 @@ pub struct Place {
 }
 
 impl Place {
-    /// A dashboard of a folder of runs there.
-    ///
-    /// # Errors
-    /// The address cannot be had.
+    /// A dashboard of a folder of runs there; refused where the address cannot be had.
     pub fn serve(self, runs: PathBuf) -> miette::Result<Dashboard> {
         let Place { listen, hosts, origins, token_file, allow_control } = self;
         Dashboard::start(Options { runs, listen, hosts, origins, token_file, control: allow_control })
     }
 }
 
-/// Serves until it is interrupted.
-///
-/// # Errors
-/// No such folder, or the address cannot be had.
+/// Serves until it is interrupted; refused where there is no such folder or the address cannot be had.
 pub fn run(args: Args, json: bool) -> miette::Result<ExitCode> {
     let folder = args.folder.unwrap_or_else(runs_folder);
     if !folder.is_dir() {

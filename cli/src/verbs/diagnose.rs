@@ -1,21 +1,16 @@
 //! `muprime diagnose`: where the gap lies, which effect causes it, how far it shrinks.
 
-use clap::Args as ClapArgs;
+use super::prelude::*;
 use diagnosis::data::Table;
 use diagnosis::document::{document, predictions};
 use diagnosis::hypotheses::Options;
 use diagnosis::progress::{Progress, Stage};
 use diagnosis::verdict::Diagnosis;
 use indicatif::ProgressBar;
-use miette::{Context, IntoDiagnostic};
-use runs::files::{MODEL, NEXT_PLAN, PAGE, PREDICTIONS, replaceable};
+use runs::files::{MODEL, NEXT_PLAN, PAGE, PREDICTIONS, replaceable, write_output};
 use runs::input::{MAX_TABLE_BYTES, bytes_of};
-use runs::print::{self, folded};
+use runs::print::folded;
 use runs::verdict::files;
-use runs::{out, say};
-use serde_json::json;
-use std::path::{Path, PathBuf};
-use std::process::ExitCode;
 use std::sync::{Arc, Mutex, PoisonError};
 use tables::check::refusal;
 use tables::passes::parse_passes;
@@ -25,7 +20,7 @@ use tables::verdict::{self, Subject};
 const PRINTED: usize = 6;
 
 /// Say where simulation and reality part on a table of passes, which effect causes it, and how far it shrinks.
-#[derive(Debug, ClapArgs)]
+#[derive(Debug, clap::Args)]
 pub struct Args {
     /// A point table (CSV or Parquet), or a run's folder with points.csv and rig.toml.
     pub data: PathBuf,
@@ -74,10 +69,8 @@ struct Inputs<'a> {
     run: Option<&'a Path>,
 }
 
-/// Reads, diagnoses, writes the requested files.
-///
-/// # Errors
-/// Files that cannot be read or written, tables and rigs that are refused; nothing is written then.
+/// Reads, diagnoses, writes the requested files: none of them where a table or a rig is refused, or a file
+/// cannot be read or written.
 pub fn run(args: Args, json: bool) -> miette::Result<ExitCode> {
     super::there(&args.data, "run or table")?;
     let run = args.data.is_dir().then_some(&*args.data);
@@ -101,7 +94,7 @@ pub fn run(args: Args, json: bool) -> miette::Result<ExitCode> {
     if let (Some(conditions), Some(out)) = (&conditions, &args.predictions) {
         let shown = || args.predict.as_ref().map_or_else(String::new, |path| path.display().to_string());
         let text = predictions(&result, conditions).into_diagnostic().wrap_err_with(shown)?;
-        write_text(out, &text)?;
+        write_output(out, text)?;
     }
     save_next(&args, &result)?;
     if args.report.is_some() || args.in_folder {
@@ -197,18 +190,16 @@ fn conditions(path: &Path, subject: &Subject) -> miette::Result<Table> {
 fn save_next(args: &Args, result: &Diagnosis) -> miette::Result<()> {
     if let Some(out) = &args.save_model {
         match runs::verdict::corrected_model(result)? {
-            Some(model) => write_text(out, &model)?,
-            None => {
-                say!(
-                    "no model written to {}: no effect of the library explains most of the gap",
-                    out.display()
-                )
-            }
+            Some(model) => write_output(out, model)?,
+            None => say!(
+                "no model written to {}: no effect of the library explains most of the gap",
+                out.display()
+            ),
         }
     }
     if let Some(out) = &args.save_plan {
         match runs::verdict::next_plan(result) {
-            Some(plan) => write_text(out, &plan)?,
+            Some(plan) => write_output(out, plan)?,
             None => say!("no plan written to {}: no conditions would tell more", out.display()),
         }
     }
@@ -235,7 +226,7 @@ fn write_page(
         say!("verdict: {}", args.data.join(files::PAGE).display());
     }
     if let Some(out) = &args.report {
-        write_text(out, &page)?;
+        write_output(out, &page)?;
         say!("report: {}", out.display());
         // The run that this is the table of.
         let run = inputs.table.parent().filter(|run| run.join("passes.jsonl").exists());
@@ -251,7 +242,7 @@ fn keep_in_run(run: &Path, page: &Path, text: &str) {
     let inside = || Some(page.canonicalize().ok()?.parent()? == run.canonicalize().ok()?);
     if inside() == Some(false) {
         let copy = run.join(files::PAGE);
-        match write_text(&copy, text) {
+        match write_output(&copy, text) {
             Ok(()) => say!("the dashboard lists its copy: {}", copy.display()),
             Err(why) => say!("the dashboard will not list this page: {why}"),
         }
@@ -286,7 +277,7 @@ fn tell_partial(stage: Option<&Stage>, json: bool) {
             .iter()
             .map(|(effects, nats)| json!({ "effects": effects, "log_evidence_over_no_gap": nats }))
             .collect();
-        print::answer_json(&json!({ "partial": true, "doing": doing, "share": share, "leading": leading }));
+        answer_json(&json!({ "partial": true, "doing": doing, "share": share, "leading": leading }));
         return;
     }
     out!("partial: stopped at {:.0} % ({doing}); no verdict", 100.0 * share);
@@ -296,8 +287,4 @@ fn tell_partial(stage: Option<&Stage>, json: bool) {
     for (effects, nats) in leading.iter().take(PRINTED) {
         out!("  {:+9.1} nats over no gap  {}", nats, effects.join(" + "));
     }
-}
-
-fn write_text(path: &Path, text: &str) -> miette::Result<()> {
-    runs::files::write_output(path, text)
 }

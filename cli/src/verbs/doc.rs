@@ -17,10 +17,7 @@ enum What {
     },
 }
 
-/// Prints the page.
-///
-/// # Errors
-/// A profile that is not there or does not hold.
+/// Prints the page; refused: a profile that is not there or does not hold.
 pub fn run(args: &Args, json: bool) -> miette::Result<ExitCode> {
     let What::Profile { profile: name } = &args.what;
     let found = runs::setup::library().find(name, Path::new("")).into_diagnostic()?;
@@ -30,10 +27,5 @@ pub fn run(args: &Args, json: bool) -> miette::Result<ExitCode> {
     }
     .into_diagnostic()?;
     let page = instruments::document::markdown(&profile);
-    if json {
-        answer_json(&json!({ "id": profile.id(), "markdown": page }));
-    } else {
-        out!("{}", page.trim_end());
-    }
-    exit(DONE)
+    answered(json, &json!({ "id": profile.id(), "markdown": page }), page.trim_end())
 }

@@ -55,10 +55,7 @@ struct Lateness {
     quantiles: [f64; 4],
 }
 
-/// Judges.
-///
-/// # Errors
-/// A setup or a plan that cannot be used.
+/// Judges; refused: a setup or a plan that cannot be used.
 pub fn run(args: Args, json: bool) -> miette::Result<ExitCode> {
     if let Some(What::Peek(args)) = &args.what {
         return peek::run(args, json);

@@ -40,16 +40,12 @@ fn broken(line: &str) -> String {
     shown + &now
 }
 
-/// A command with its examples, and those of its subcommands.
-pub fn with_examples(command: clap::Command) -> clap::Command {
-    put(command, "")
-}
-
-fn put(mut command: clap::Command, path: &str) -> clap::Command {
+/// A command with its examples, and those of its subcommands; `path` leads to it from the program.
+pub fn with_examples(mut command: clap::Command, path: &str) -> clap::Command {
     let names: Vec<String> = command.get_subcommands().map(|s| s.get_name().to_string()).collect();
     for name in names {
         let path = if path.is_empty() { name.clone() } else { format!("{path} {name}") };
-        command = command.mut_subcommand(&name, |sub| put(sub, &path));
+        command = command.mut_subcommand(&name, |sub| with_examples(sub, &path));
     }
     if let Some(usage) = short_usage(&command, path) {
         command = command.override_usage(usage);

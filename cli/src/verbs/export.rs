@@ -18,10 +18,7 @@ pub struct Args {
     stated: Stated,
 }
 
-/// Converts.
-///
-/// # Errors
-/// A folder that holds no run, or a place that cannot be written.
+/// Converts; refused: a folder that holds no run, or a place that cannot be written.
 pub fn run(args: Args, json: bool) -> miette::Result<ExitCode> {
     super::there(&args.run, "run")?;
     let run = runs::report::read(&args.run)?;

@@ -43,10 +43,7 @@ pub struct Args {
     scene: Option<PathBuf>,
 }
 
-/// Runs the seeds.
-///
-/// # Errors
-/// A scene that cannot be read.
+/// Runs the seeds; refused: a scene that cannot be read.
 pub fn run(args: Args, json: bool) -> miette::Result<ExitCode> {
     if let Some(path) = &args.scene {
         let text = runs::input::text_of(path)?;
@@ -66,18 +63,11 @@ pub fn run(args: Args, json: bool) -> miette::Result<ExitCode> {
     studies::progress::on_interrupt(&bar, move |_| {
         let tally = so_far.lock().unwrap_or_else(PoisonError::into_inner).clone();
         if json {
-            match document(&tally, None, true) {
-                Ok(text) => out!("{text}"),
-                Err(why) => runs::say!("{why}"),
-            }
-        } else {
-            studies::validation::faults::table(&tally);
-            out!(
-                "partial: {} of {seeds} runs, {} over a bound or otherwise wrong",
-                tally.scenes,
-                tally.failed
-            );
+            return answer_json(&document(&tally, None, true));
         }
+        studies::validation::faults::table(&tally);
+        let (runs, failed) = (tally.scenes, tally.failed);
+        out!("partial: {runs} of {seeds} runs, {failed} over a bound or otherwise wrong");
     })?;
     let tally = search(&args.scenes.settings(), seeds, &mut |tally| {
         bar.inc(1);
@@ -88,34 +78,25 @@ pub fn run(args: Args, json: bool) -> miette::Result<ExitCode> {
     let simulated_s = tally.cycles as f64 * studies::validation::faults::bench::T.seconds();
     let speed = simulated_s / cpu_s.max(1e-9);
     if json {
-        out!("{}", document(&tally, Some(speed), false)?);
+        answer_json(&document(&tally, Some(speed), false));
     } else {
         studies::validation::faults::table(&tally);
-        out!(
-            "{} runs in {:.0} s, {} over a bound or otherwise wrong",
-            tally.scenes,
-            begun.elapsed().as_secs_f64(),
-            tally.failed
-        );
+        let (runs, took_s, failed) = (tally.scenes, begun.elapsed().as_secs_f64(), tally.failed);
+        out!("{runs} runs in {took_s:.0} s, {failed} over a bound or otherwise wrong");
         out!(
             "{simulated_s:.0} s simulated in {cpu_s:.0} s of processor time: {speed:.0} times real time per core"
         );
         for failure in &tally.failures {
             out!("seed {}: {}", failure.seed, failure.wrong.join("; "));
-            out!("  again: muprime faults --scene FILE, with {}", json_of(&failure.smallest)?);
+            let smallest = serde_json::to_string(&failure.smallest).into_diagnostic()?;
+            out!("  again: muprime faults --scene FILE, with {smallest}");
         }
     }
     exit(if tally.failed == 0 { DONE } else { FAILED })
 }
 
-fn json_of(value: &impl serde::Serialize) -> miette::Result<String> {
-    serde_json::to_string(value).into_diagnostic()
-}
-
-fn document(tally: &Tally, speed: Option<f64>, partial: bool) -> miette::Result<String> {
-    let rows: Vec<_> = tally
-        .reactions
-        .iter()
+fn document(tally: &Tally, speed: Option<f64>, partial: bool) -> serde_json::Value {
+    let rows: Vec<_> = (tally.reactions.iter())
         .map(|((number, name, moment), r)| {
             json!({ "number": number, "fault": name, "phase": moment, "reactions": r })
         })
@@ -126,5 +107,5 @@ fn document(tally: &Tally, speed: Option<f64>, partial: bool) -> miette::Result<
     if partial {
         document["partial"] = true.into();
     }
-    json_of(&document)
+    document
 }

@@ -1,7 +1,7 @@
 //! `muprime gather`: the results of a study as one table.
 
 use super::prelude::*;
-use studies::cases::gather::gather;
+use studies::cases::gather::{Gathered, gather};
 use studies::cases::study::Study;
 
 #[derive(Debug, clap::Args)]
@@ -19,28 +19,15 @@ pub struct Args {
     any_build: bool,
 }
 
-/// Gathers.
-///
-/// # Errors
-/// Holes, duplicates that differ, mixed versions or builds: no table is written.
+/// Gathers; no table is written of holes, duplicates that differ, mixed versions or builds.
 pub fn run(args: Args, json: bool) -> miette::Result<ExitCode> {
     let study = Study::in_folder(&args.dir, args.cases.as_deref())?;
     let to = args.output.unwrap_or_else(|| study.out.join("gathered.parquet"));
     let gathered = gather(&study, &to, args.any_build)?;
-    if json {
-        answer_json(&gathered);
-    } else {
-        if gathered.parts > 0 {
-            say!("{} unfinished files in parts/: of workers at work, or killed", gathered.parts);
-        }
-        out!(
-            "{}: {} cases of {} shards, {} without a result\nSHA-256 {}",
-            gathered.file.display(),
-            gathered.cases,
-            gathered.shards,
-            gathered.failed,
-            gathered.sha256
-        );
+    if gathered.parts > 0 && !json {
+        say!("{} unfinished files in parts/: of workers at work, or killed", gathered.parts);
     }
-    exit(DONE)
+    let Gathered { file, cases, shards, failed, sha256, .. } = &gathered;
+    let words = format!("{cases} cases of {shards} shards, {failed} without a result\nSHA-256 {sha256}");
+    answered(json, &gathered, format!("{}: {words}", file.display()))
 }

@@ -69,20 +69,12 @@ fn mark(text: &str) -> Result<char, String> {
     }
 }
 
-/// Imports.
-///
-/// # Errors
-/// A source or a map that is refused; a folder that holds a table already. Nothing is written then.
+/// Imports; nothing is written where a source or a map is refused, or the folder holds a table already.
 pub fn run(args: Args, json: bool) -> miette::Result<ExitCode> {
-    for name in ["points.csv", "rig.toml", "import.json"] {
-        let path = args.out.join(name);
-        if path.exists() {
-            miette::bail!(
-                help = "give another folder, or remove it first",
-                "{} is there already",
-                path.display()
-            );
-        }
+    let there = ["points.csv", "rig.toml", "import.json"].map(|name| args.out.join(name));
+    if let Some(path) = there.iter().find(|path| path.exists()) {
+        let help = "give another folder, or remove it first";
+        miette::bail!(help = help, "{} is there already", path.display());
     }
     if args.out.exists() && !args.out.is_dir() {
         let help = "name a folder, as in -o imported";
@@ -99,24 +91,13 @@ pub fn run(args: Args, json: bool) -> miette::Result<ExitCode> {
     let wanted = Map::headers(&args.map);
     let grid = read(&args.file, &bytes, args.sheet.as_deref(), marks, &wanted)?;
     let map = map_of(&args, &grid)?;
-    let rig = match &args.rig {
-        Some(path) => {
-            runs::input::rig_file(path)?;
-            Some(runs::input::text_of(path)?)
-        }
-        None => None,
-    };
+    let text_of = |path: &PathBuf| runs::input::rig_file(path).and_then(|_| runs::input::text_of(path));
+    let rig = args.rig.as_ref().map(text_of).transpose()?;
     let series = args.series.then_some(Cut { settle_s: args.settle_s, window_s: args.window_s });
     let accepts = |what: &str| args.accept.iter().any(|a| a == what);
-    let wanted = Wanted {
-        map,
-        set: args.set.clone(),
-        series,
-        rig,
-        tip: args.tip.as_deref(),
-        padding: accepts("padding"),
-        unsorted: accepts("unsorted"),
-    };
+    let (padding, unsorted) = (accepts("padding"), accepts("unsorted"));
+    let (set, tip) = (args.set.clone(), args.tip.as_deref());
+    let wanted = Wanted { map, set, series, rig, tip, padding, unsorted };
     let source = args.file.file_name().unwrap_or_default().to_string_lossy();
     let Imported { table, rig, log } = import(&source, &bytes, &grid, &wanted)?;
     make_folder(&args.out)?;
@@ -138,7 +119,7 @@ pub fn run(args: Args, json: bool) -> miette::Result<ExitCode> {
     log.notes.iter().for_each(|note| say!("note: {note}"));
     log.assumed.iter().for_each(|what| say!("assumed in rig.toml: {what}"));
     if let Some(series) = &log.series {
-        let t = &series.counts;
+        let t = series;
         say!(
             "of {} samples {} are in passes; left out: {} of changing speed, load or vibration, {} at beginnings, {} in short stretches; {} reversals",
             t.samples,
@@ -150,22 +131,15 @@ pub fn run(args: Args, json: bool) -> miette::Result<ExitCode> {
         );
     }
     if !log.dropped.is_empty() {
-        say!(
-            "{} {} left out; import.json lists each with the reason. The first:",
-            log.dropped.len(),
-            if log.dropped.len() == 1 { "row was" } else { "rows were" }
-        );
+        let rows = if log.dropped.len() == 1 { "row was" } else { "rows were" };
+        say!("{} {rows} left out; import.json lists each with the reason. The first:", log.dropped.len());
         for d in log.dropped.iter().take(3) {
             say!("  row {}: {} '{}': {}", d.row, d.column, d.text, d.reason);
         }
     }
     log.remarks.iter().for_each(|remark| say!("remark: {remark}"));
-    say!(
-        "{} passes: {}; next: muprime diagnose {}",
-        log.passes,
-        args.out.join("points.csv").display(),
-        args.out.display()
-    );
+    let (table, folder) = (args.out.join("points.csv"), args.out.display());
+    say!("{} passes: {}; next: muprime diagnose {folder}", log.passes, table.display());
     exit(DONE)
 }
 

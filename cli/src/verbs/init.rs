@@ -13,19 +13,12 @@ pub struct Args {
     out: Option<PathBuf>,
 }
 
-/// Prints the file, or writes it with its schema.
-///
-/// # Errors
-/// A file that is there already, or cannot be written.
+/// Prints the file, or writes it with its schema; refused: a file that is there already, or cannot be
+/// written.
 pub fn run(args: &Args, json: bool) -> miette::Result<ExitCode> {
     let text = text(args.kind);
     let Some(path) = &args.out else {
-        if json {
-            answer_json(&json!({ "kind": args.kind.name(), "text": text }));
-        } else {
-            out!("{}", text.trim_end());
-        }
-        return exit(DONE);
+        return answered(json, &json!({ "kind": args.kind.name(), "text": text }), text.trim_end());
     };
     if path.exists() {
         miette::bail!(help = "give another name with --out", "{} is there already", path.display());

@@ -9,10 +9,7 @@ pub struct Args {
     folder: PathBuf,
 }
 
-/// Writes a page for the program and for each of its commands.
-///
-/// # Errors
-/// A folder that cannot be written.
+/// Writes a page for the program and for each of its commands; refused: a folder that cannot be written.
 pub fn run(args: &Args, command: &clap::Command, json: bool) -> miette::Result<ExitCode> {
     make_folder(&args.folder)?;
     let mut command = command.clone().disable_help_subcommand(true);

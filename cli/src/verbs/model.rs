@@ -48,10 +48,8 @@ enum ModelVerb {
     AmplitudeFor(amplitude_for::AmplitudeForArgs),
 }
 
-/// Runs the subcommand. Bad input is refused with exit status 2.
-///
-/// # Errors
-/// What could not be done for an inner reason, such as a file that cannot be written.
+/// Runs the subcommand. Bad input is refused with exit status 2; else it fails for an inner reason, such as a
+/// file that cannot be written.
 pub fn run(args: ModelArgs, json: bool) -> miette::Result<ExitCode> {
     match args.verb {
         ModelVerb::Point(args) => point::run(&args, json),

@@ -12,10 +12,7 @@ pub struct Args {
     file: PathBuf,
 }
 
-/// Recovers.
-///
-/// # Errors
-/// A file that is not there, or that holds nothing of a record; nothing is written then.
+/// Recovers; refused: a file that is not there, or that holds nothing of a record; nothing is written then.
 pub fn run(args: Args, json: bool) -> miette::Result<ExitCode> {
     let file = &args.file;
     let shown = || file.display().to_string();

@@ -30,10 +30,8 @@ struct Found {
 }
 
 /// Runs every cycle of every record of a run again, and compares its decisions with those recorded, bit for
-/// bit. It holds only where the record is whole: of what is missing nothing is known.
-///
-/// # Errors
-/// A record that cannot be read, or that lacks what a replay needs.
+/// bit. It holds only where the record is whole: of what is missing nothing is known. Refused: a record that
+/// cannot be read, or that lacks what a replay needs.
 pub fn run(args: Args, json: bool) -> miette::Result<ExitCode> {
     super::there(&args.run, "run or recording")?;
     let (records, gone) = if args.run.is_dir() {

@@ -1,11 +1,7 @@
 //! `muprime report FOLDER`: the page of a run, or of a campaign.
 
-use runs::print::answer_json;
+use super::prelude::*;
 use runs::report::published;
-use runs::say;
-use serde_json::json;
-use std::path::PathBuf;
-use std::process::ExitCode;
 
 #[derive(Debug, clap::Args)]
 pub struct Args {
@@ -21,10 +17,7 @@ pub struct Args {
     overlay: Vec<String>,
 }
 
-/// Writes the report.
-///
-/// # Errors
-/// A folder that holds no run, or a place that cannot be written.
+/// Writes the report; refused: a folder that holds no run, or a place that cannot be written.
 pub fn run(args: Args, json: bool) -> miette::Result<ExitCode> {
     super::there(&args.run, "run")?;
     if args.run.join(runs::campaign::FILE).is_file() {
@@ -41,7 +34,7 @@ pub fn run(args: Args, json: bool) -> miette::Result<ExitCode> {
         } else {
             super::run::campaign::tell(&claims, made, planned, &args.run);
         }
-        return super::exit(super::DONE);
+        return exit(DONE);
     }
     let overlay: miette::Result<Vec<_>> = args.overlay.iter().map(|name| published::of(name)).collect();
     // Made again from the record, so that the page and the file agree with this version.
@@ -59,5 +52,5 @@ pub fn run(args: Args, json: bool) -> miette::Result<ExitCode> {
         say!("report: {}", out.display());
         damage.iter().for_each(|d| say!("{d}"));
     }
-    super::exit(super::DONE)
+    exit(DONE)
 }

@@ -3,8 +3,8 @@
 pub mod campaign;
 
 use super::dashboard::Place;
+use super::prelude::*;
 use indicatif::{ProgressBar, ProgressDrawTarget, ProgressStyle};
-use miette::IntoDiagnostic;
 use models::condition::Condition;
 use models::law::BuiltIn;
 use realtime::ports::Nanos;
@@ -14,17 +14,14 @@ use rig::publish::{Broker, Publisher};
 use rig::watch::{Lead, Watch};
 use runs::catalogue::runs_folder;
 use runs::plan::Plan;
-use runs::print::{self, answer_json, clean, folded};
-use runs::say;
+use runs::print::{self, clean, folded};
 use runs::sequence::{Event, Outcome};
 use runs::session::{Job, Notes, Signals, Summary, Update, unix_ns};
 use runs::setup::Setup;
 use runs::supervisor::MAY_BE_ON;
-use serde_json::{Value, json};
+use serde_json::Value;
 use std::io::IsTerminal;
 use std::net::SocketAddr;
-use std::path::{Path, PathBuf};
-use std::process::ExitCode;
 use std::sync::Arc;
 use std::sync::atomic::Ordering;
 
@@ -98,16 +95,11 @@ pub struct Args {
     allow_control: bool,
 }
 
-/// Runs the sweep.
-///
-/// # Errors
-/// A refusal: bad input, a busy rig, an instrument that does not answer.
+/// Runs the sweep; refused: bad input, a busy rig, an instrument that does not answer.
 pub fn run(mut args: Args, json: bool) -> miette::Result<ExitCode> {
     if args.tui && json {
-        miette::bail!(
-            help = "leave out one of them",
-            "--tui shows a picture, --json prints documents: not both"
-        );
+        let help = "leave out one of them";
+        miette::bail!(help = help, "--tui shows a picture, --json prints documents: not both");
     }
     if let Some((text, folder)) = runs::campaign::text_of(&args.plan)? {
         return campaign::run(args, &text, &folder, json);
@@ -130,48 +122,40 @@ pub fn run(mut args: Args, json: bool) -> miette::Result<ExitCode> {
         super::tell_beside(&job.out)?;
     }
     let runs = job.out.parent().filter(|p| !p.as_os_str().is_empty()).unwrap_or(Path::new("."));
-    let watching = Watching::begin(&mut args, runs)?;
-    super::exit(if measure(job, points.len(), &watching, json)? { super::DONE } else { super::FAILED })
+    serve(&mut args, runs)?;
+    exit(if measure(job, points.len(), &args, json)? { DONE } else { FAILED })
 }
 
-/// Who follows a run: a terminal, a broker.
-struct Watching {
-    tui: bool,
-    broker: Option<Broker>,
-}
-
-impl Watching {
-    /// As the arguments say; a dashboard is served from here on, over a folder of runs.
-    fn begin(args: &mut Args, runs: &Path) -> miette::Result<Self> {
-        if let Some(listen) = args.dashboard.take() {
-            let place = Place {
-                listen,
-                hosts: Vec::new(),
-                origins: std::mem::take(&mut args.origins),
-                token_file: args.token_file.take(),
-                allow_control: args.allow_control,
-            };
-            report!("dashboard: {}", place.serve(runs.to_path_buf())?.link());
-        }
-        Ok(Watching { tui: args.tui, broker: args.publish.clone() })
+/// A dashboard, where the arguments want one, is served from here on, over a folder of runs.
+fn serve(args: &mut Args, runs: &Path) -> miette::Result<()> {
+    if let Some(listen) = args.dashboard.take() {
+        let place = Place {
+            listen,
+            hosts: Vec::new(),
+            origins: std::mem::take(&mut args.origins),
+            token_file: args.token_file.take(),
+            allow_control: args.allow_control,
+        };
+        report!("dashboard: {}", place.serve(runs.to_path_buf())?.link());
     }
+    Ok(())
 }
 
 /// Measures one run of so many passes. Returns whether it is complete, and the drive was read back off.
-fn measure(job: Job, planned: usize, watching: &Watching, json: bool) -> miette::Result<bool> {
+fn measure(job: Job, planned: usize, args: &Args, json: bool) -> miette::Result<bool> {
     if !job.fast {
         // In virtual time nothing is driven, and a slow reader gets every line.
         super::tell_beside(&job.out)?;
     }
-    keys_are_free(&job, watching.tui)?;
+    keys_are_free(&job, args.tui)?;
     let signals = Signals::default();
     watch_signals(&signals)?;
     // Up before anything moves, and down before the summary. Output in between is held and printed then.
-    let watch = match watching.tui {
+    let watch = match args.tui {
         true => Some(Watch::begin(&job.out, Lead::Own(signals.clone()), job.setup.hand_at_key())?),
         false => None,
     };
-    let mut followers = Followers::begin(&job, planned, watching, json)?;
+    let mut followers = Followers::begin(&job, planned, args, json)?;
     let before = runs::run_dir::passes_in(&job.out).unwrap_or_default();
     let mut feed = Feed::new(live::Run::of(&job, planned, before.len()), before, &signals);
     let summary = rig::session::run(job, &signals, &mut |news| {
@@ -185,7 +169,7 @@ fn measure(job: Job, planned: usize, watching: &Watching, json: bool) -> miette:
         tell(summary, json);
     }
     feed.end(live::Ended::of(&summary));
-    followers.end(&summary, watching.broker.as_ref());
+    followers.end(&summary, args.publish.as_ref());
     let summary = summary?;
     Ok(summary.outcome == Outcome::Complete && summary.off.read_back)
 }
@@ -227,8 +211,8 @@ struct Followers {
 
 impl Followers {
     /// Says what begins.
-    fn begin(job: &Job, planned: usize, watching: &Watching, json: bool) -> miette::Result<Self> {
-        let bar = progress_bar(json || watching.tui, planned as u64);
+    fn begin(job: &Job, planned: usize, args: &Args, json: bool) -> miette::Result<Self> {
+        let bar = progress_bar(json || args.tui, planned as u64);
         // Looked at once: while it is drawn, whoever asks it anything waits for the terminal.
         let hidden = bar.is_hidden();
         let (plan, setup) = (&job.plan.file.name, &job.setup.file.name);
@@ -241,7 +225,7 @@ impl Followers {
             let out = job.out.display();
             followers.say(format!("{plan} on {setup}: {planned} passes in {clock}, into {out}"));
         }
-        followers.publisher = watching.broker.as_ref().map(Publisher::start).transpose()?;
+        followers.publisher = args.publish.as_ref().map(Publisher::start).transpose()?;
         followers.publish("run", Value::clone);
         Ok(followers)
     }
@@ -332,15 +316,10 @@ fn job(args: &Args) -> miette::Result<Job> {
 
 /// A run of this plan on this setup, with what the arguments say beside.
 fn job_of(args: &Args, setup: Setup, plan: Plan, seed: u64, out: PathBuf) -> miette::Result<Job> {
-    let defects = match &args.defects {
-        None => None,
-        Some(path) => {
-            if setup.file.virtual_rig.is_none() {
-                miette::bail!("--defects belongs to a virtual rig; '{}' is a real one", setup.file.name);
-            }
-            Some(super::defects(path)?)
-        }
-    };
+    if args.defects.is_some() && setup.file.virtual_rig.is_none() {
+        miette::bail!("--defects belongs to a virtual rig; '{}' is a real one", setup.file.name);
+    }
+    let defects = args.defects.as_deref().map(super::defects).transpose()?;
     let slider = PathBuf::from(BuiltIn::SpringSlider.name());
     let tables::law::Loaded { model, file: model_file } =
         tables::law::for_run(args.model.as_ref().unwrap_or(&slider), &setup)?;
@@ -363,24 +342,18 @@ fn new_name(plan: &str) -> String {
 /// SIGINT, SIGTERM and SIGHUP ask for a stop; a second one leaves within two seconds whatever happens.
 fn watch_signals(signals: &Signals) -> miette::Result<()> {
     use signal_hook::consts::{SIGHUP, SIGINT, SIGTERM};
-    let stops = Arc::clone(&signals.stops);
-    let mut caught = signal_hook::iterator::Signals::new([SIGINT, SIGTERM, SIGHUP]).into_diagnostic()?;
-    std::thread::Builder::new()
-        .name("signals".into())
-        .spawn(move || {
-            for (i, _) in caught.forever().enumerate() {
-                stops.fetch_add(1, Ordering::Relaxed);
-                if i > 0 {
-                    // A terminal that takes nothing keeps nobody from leaving.
-                    std::thread::spawn(|| say!("leaving at once: {MAY_BE_ON}"));
-                    // The first one has sent the stop; nobody can wait here for what was read back.
-                    std::thread::sleep(std::time::Duration::from_millis(1500));
-                    runs::leave::leave_now(super::FAILED);
-                }
-            }
-        })
-        .into_diagnostic()?;
-    Ok(())
+    let (stops, mut is_first) = (Arc::clone(&signals.stops), true);
+    studies::progress::on_signals(&[SIGINT, SIGTERM, SIGHUP], move || {
+        stops.fetch_add(1, Ordering::Relaxed);
+        if std::mem::take(&mut is_first) {
+            return;
+        }
+        // A terminal that takes nothing keeps nobody from leaving.
+        std::thread::spawn(|| say!("leaving at once: {MAY_BE_ON}"));
+        // The first one has sent the stop; nobody can wait here for what was read back.
+        std::thread::sleep(std::time::Duration::from_millis(1500));
+        runs::leave::leave_now(FAILED);
+    })
 }
 
 /// A bar that was not drawn yet: the first line of it too may find a terminal that takes nothing.

@@ -34,21 +34,14 @@ pub struct Args {
     note: Option<String>,
 }
 
-/// Lists, or annotates one run.
-///
-/// # Errors
-/// A folder that holds no run, or cannot be read; tags or a note that are too long.
+/// Lists, or annotates one run; refused: a folder that holds no run, or cannot be read; tags or a note that
+/// are too long.
 pub fn run(args: Args, json: bool) -> miette::Result<ExitCode> {
     if let Some(run) = &args.run {
         let annotations = annotate(run, &args)?;
-        if json {
-            answer_json(&annotations);
-        } else {
-            let tags = if annotations.tags.is_empty() { "none".into() } else { annotations.tags.join(", ") };
-            out!("tags: {tags}");
-            out!("note: {}", if annotations.note.is_empty() { "none" } else { &annotations.note });
-        }
-        return exit(DONE);
+        let tags = if annotations.tags.is_empty() { "none".into() } else { annotations.tags.join(", ") };
+        let note = if annotations.note.is_empty() { "none" } else { &annotations.note };
+        return answered(json, &annotations, format!("tags: {tags}\nnote: {note}"));
     }
     let folder = args.folder.unwrap_or_else(runs_folder);
     let mut runs = existing(&folder)?;

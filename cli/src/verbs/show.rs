@@ -20,10 +20,8 @@ pub struct Args {
     out: Option<PathBuf>,
 }
 
-/// Lists, or prints one file, or writes a sample.
-///
-/// # Errors
-/// A name that nothing has, a folder that cannot be written.
+/// Lists, or prints one file, or writes a sample; refused: a name that nothing has, a folder that cannot be
+/// written.
 pub fn run(args: &Args, json: bool) -> miette::Result<ExitCode> {
     let all = all();
     match (&args.name, args.sample) {
@@ -49,11 +47,8 @@ pub fn run(args: &Args, json: bool) -> miette::Result<ExitCode> {
                     "nothing that is bundled is called '{name}'"
                 );
             };
-            if json {
-                answer_json(&json!({ "kind": found.kind, "name": found.name, "text": found.text }));
-            } else {
-                out!("{}", found.text.trim_end());
-            }
+            let document = json!({ "kind": found.kind, "name": found.name, "text": found.text });
+            return answered(json, &document, found.text.trim_end());
         }
     }
     exit(DONE)

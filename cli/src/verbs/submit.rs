@@ -2,8 +2,9 @@
 
 use super::prelude::*;
 use studies::cases::engines::quoted;
+use studies::cases::plan::Pilot;
 use studies::cases::study::Study;
-use studies::cases::submit::{Options, cancel, checked, submit, tasks};
+use studies::cases::submit::{Options, Submitted, cancel, checked, submit, tasks};
 
 #[derive(Debug, clap::Args)]
 pub struct Args {
@@ -23,19 +24,13 @@ pub struct Args {
     cancel: bool,
 }
 
-/// Submits, follows, says what is missing; or prints the plan.
-///
-/// # Errors
-/// Bad cases, an engine that takes nothing.
+/// Submits, follows, says what is missing; or prints the plan; refused: bad cases, an engine that takes
+/// nothing.
 pub fn run(args: Args, json: bool) -> miette::Result<ExitCode> {
     if args.cancel {
         let ids = cancel(&args.out)?;
-        if json {
-            answer_json(&json!({ "cancelled": ids }));
-        } else {
-            out!("cancelled: {}", if ids.is_empty() { "nothing was at work".into() } else { ids.join(", ") });
-        }
-        return exit(DONE);
+        let words = if ids.is_empty() { "nothing was at work".into() } else { ids.join(", ") };
+        return answered(json, &json!({ "cancelled": ids }), format!("cancelled: {words}"));
     }
     let options = &args.options;
     checked(options)?;
@@ -56,24 +51,16 @@ pub fn run(args: Args, json: bool) -> miette::Result<ExitCode> {
     if json {
         answer_json(&submitted);
     } else {
-        if let Some(pilot) = submitted.pilot {
+        let Submitted { cases, there, tasks, cases_a_task, limit_s, wall_seconds, .. } = submitted;
+        if let Some(Pilot { cases, mean_s, longest_s, .. }) = submitted.pilot {
             say!(
-                "pilot: {:.3} s a case, the longest of {} {:.3} s; {} tasks of {} cases, {:.0} s each at most",
-                pilot.mean_s,
-                pilot.cases,
-                pilot.longest_s,
-                submitted.tasks,
-                submitted.cases_a_task,
-                submitted.limit_s
+                "pilot: {mean_s:.3} s a case, the longest of {cases} {longest_s:.3} s; \
+                 {tasks} tasks of {cases_a_task} cases, {limit_s:.0} s each at most"
             );
         }
+        let (out, done) = (submitted.out.display(), cases - submitted.missing);
         out!(
-            "{}: {} of {} cases have a result, {} of them from before; {:.1} s",
-            submitted.out.display(),
-            submitted.cases - submitted.missing,
-            submitted.cases,
-            submitted.there,
-            submitted.wall_seconds
+            "{out}: {done} of {cases} cases have a result, {there} of them from before; {wall_seconds:.1} s"
         );
         if !whole {
             out!("output of the tasks: {}", submitted.out.join("jobs").display());

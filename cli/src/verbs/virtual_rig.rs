@@ -41,10 +41,7 @@ pub struct Args {
     seed: u64,
 }
 
-/// Serves until interrupted.
-///
-/// # Errors
-/// A setup, defects file or address that cannot be used.
+/// Serves until interrupted; refused: a setup, defects file or address that cannot be used.
 pub fn run(args: Args, json: bool) -> miette::Result<ExitCode> {
     let setup = super::setup(&args.setup)?;
     let mut config = setup.file.virtual_rig.clone().unwrap_or_default().world();
@@ -75,19 +72,13 @@ pub fn run(args: Args, json: bool) -> miette::Result<ExitCode> {
             args.modbus_tcp
         );
     }
-    let embedded =
+    let mut embedded =
         rig::emulators::embed(&mut instruments, &plant, true).map_err(|e| miette::miette!("{e}"))?;
-    let mut embedded = embedded;
-    let vibrometer = match setup.file.vibrometer.clone() {
-        None => None,
-        Some(mut vibrometer) => {
-            let served =
-                rig::emulators::vibrometer(&mut vibrometer, &plant).map_err(|e| miette::miette!("{e}"))?;
-            embedded.places.push(format!("{} at {}", vibrometer.profile, vibrometer.address));
-            Some(served)
-        }
-    };
-    let modbus_tcp = embedded.modbus_tcp().map(|address| address.to_string());
+    let mut vibrometer = setup.file.vibrometer.clone();
+    let served = vibrometer.as_mut().map(|v| rig::emulators::vibrometer(v, &plant)).transpose();
+    let served = served.map_err(|e| miette::miette!("{e}"))?;
+    embedded.places.extend(vibrometer.map(|v| format!("{} at {}", v.profile, v.address)));
+    let modbus_tcp = embedded.modbus_tcp.map(|address| address.to_string());
     if json {
         answer_json(&json!({ "modbus_tcp": modbus_tcp, "instruments": embedded.places }));
     } else {
@@ -109,7 +100,7 @@ pub fn run(args: Args, json: bool) -> miette::Result<ExitCode> {
         signal_hook::iterator::Signals::new([signal_hook::consts::SIGINT, signal_hook::consts::SIGTERM])
             .into_diagnostic()?;
     let _ = signals.forever().next();
-    drop((line, embedded, vibrometer));
+    drop((line, embedded, served));
     exit(DONE)
 }
 

@@ -4,6 +4,7 @@ use super::prelude::*;
 use rig::watch::{Lead, Watch};
 use runs::catalogue::{existing, runs_folder};
 use runs::sequence::MeasuredPass;
+use signal_hook::consts::{SIGHUP, SIGINT, SIGTERM};
 use std::io::{BufRead, BufReader, IsTerminal};
 use std::time::Duration;
 
@@ -14,24 +15,17 @@ pub struct Args {
 }
 
 /// Shows a run until somebody leaves it; with `--json`, or where no terminal is, prints passes as they come
-/// until the run has ended.
-///
-/// # Errors
-/// No run there.
+/// until the run has ended; refused where there is no run.
 pub fn run(args: Args, json: bool) -> miette::Result<ExitCode> {
-    let run = match args.run {
-        Some(run) => run,
-        None => {
-            let folder = runs_folder();
-            folder.join(&existing(&folder)?[0].folder)
-        }
-    };
+    let newest = |all: PathBuf| Ok::<_, miette::Report>(all.join(&existing(&all)?[0].folder));
+    let run = args.run.map_or_else(|| newest(runs_folder()), Ok)?;
     let journal = run.join("passes.jsonl");
     let file = std::fs::File::open(&journal)
         .into_diagnostic()
         .wrap_err_with(|| format!("{} holds no run", run.display()))?;
     if !json && std::io::stdout().is_terminal() && rig::terminal::has_keys().is_ok() {
-        leave_on_signals()?;
+        // A signal takes the view down, and nothing else: the run is another process's.
+        studies::progress::on_signals(&[SIGINT, SIGTERM, SIGHUP], || runs::leave::leave_now(DONE))?;
         Watch::begin(&run, Lead::Other, false)?.wait();
         return exit(DONE);
     }
@@ -40,10 +34,7 @@ pub fn run(args: Args, json: bool) -> miette::Result<ExitCode> {
     loop {
         // Looked at before reading: what was written before the lock went is still printed.
         let running = runs::run_dir::is_held(&run);
-        while reader.read_line(&mut line).into_diagnostic()? > 0 {
-            if !line.ends_with('\n') {
-                break;
-            }
+        while reader.read_line(&mut line).into_diagnostic()? > 0 && line.ends_with('\n') {
             show(&line, json);
             line.clear();
         }
@@ -52,19 +43,6 @@ pub fn run(args: Args, json: bool) -> miette::Result<ExitCode> {
         }
         std::thread::sleep(Duration::from_millis(200));
     }
-}
-
-/// A signal takes the view down, and nothing else: the run is another process's.
-fn leave_on_signals() -> miette::Result<()> {
-    use signal_hook::consts::{SIGHUP, SIGINT, SIGTERM};
-    let mut caught = signal_hook::iterator::Signals::new([SIGINT, SIGTERM, SIGHUP]).into_diagnostic()?;
-    let leave = move || {
-        if caught.forever().next().is_some() {
-            runs::leave::leave_now(DONE);
-        }
-    };
-    std::thread::Builder::new().name("signals".into()).spawn(leave).into_diagnostic()?;
-    Ok(())
 }
 
 fn show(line: &str, json: bool) {

@@ -44,7 +44,7 @@ pub(super) fn levels(mut values: Vec<f64>) -> Vec<[f64; 2]> {
 pub(super) fn cuts(passes: &[Condition], places: &[Condition]) -> Vec<Cut> {
     let one = |index: usize| {
         let covariate = covariate::COVARIATES[index];
-        let values: Vec<f64> = places.iter().map(|p| covariate.of(p)).collect::<Option<_>>()?;
+        let values = covariate.of_all(places)?;
         if covariate.role == Role::Climate && spread(&values) < covariate.least_spread {
             return None;
         }

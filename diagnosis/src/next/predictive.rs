@@ -45,24 +45,17 @@ pub fn predictives(
         order.insert(0, leader);
     }
     order.truncate(k.design_candidates);
-    let mut list: Vec<Predictive> = order
-        .into_par_iter()
-        .map(|i| {
-            let c = &fitted.candidates[i];
-            let (mean, covariance) = expected(fitted, &problem, &basis, &c.best);
-            let probability = decision.probabilities[i].max(k.design_least_probability);
-            Predictive { name: c.names().join("+"), probability, mean, covariance, scatter: Vec::new() }
-        })
-        .collect();
-    let (mean, covariance) = expected(fitted, &problem, &basis, &fitted.none);
-    let name = "no gap".to_string();
-    list.push(Predictive {
-        name,
-        probability: decision.none.max(k.design_least_probability),
-        mean,
-        covariance,
-        scatter: Vec::new(),
-    });
+    let of = |name: String, probability: f64, best: &Posterior| {
+        let (mean, covariance) = expected(fitted, &problem, &basis, best);
+        let probability = probability.max(k.design_least_probability);
+        Predictive { name, probability, mean, covariance, scatter: Vec::new() }
+    };
+    let cause = |i: usize| {
+        let c = &fitted.candidates[i];
+        of(c.names().join("+"), decision.probabilities[i], &c.best)
+    };
+    let mut list: Vec<Predictive> = order.into_par_iter().map(cause).collect();
+    list.push(of("no gap".to_string(), decision.none, &fitted.none));
 
     let level: Vec<f64> = list[0].mean.iter().copied().collect();
     let scatter = fitted.scatter_of_a_pass(&problem, rig, &fitted.none.u, &level);
@@ -71,14 +64,8 @@ pub fn predictives(
     }
     let (mean, covariance, white) = fitted.discrepancy.belief(&fitted.problem, grid);
     let scatter = scatter.iter().zip(&white).map(|(s, w)| s + w).collect();
-    let name = "unknown".to_string();
-    list.push(Predictive {
-        name,
-        probability: decision.unknown.max(k.design_least_probability),
-        mean,
-        covariance,
-        scatter,
-    });
+    let (name, probability) = ("unknown".to_string(), decision.unknown.max(k.design_least_probability));
+    list.push(Predictive { name, probability, mean, covariance, scatter });
     list
 }
 
@@ -108,9 +95,7 @@ fn expected(fitted: &Fitted, grid: &Problem, basis: &Basis, e: &Posterior) -> (D
         precision[(k, k)] += 1.0;
     }
     let factor = precision.cholesky().expect("a prior makes the precision positive definite");
-    let root = factor
-        .l()
-        .solve_lower_triangular(&planned.transpose())
-        .expect("a Cholesky factor has no zero on its diagonal");
+    let root = factor.l().solve_lower_triangular(&planned.transpose());
+    let root = root.expect("a Cholesky factor has no zero on its diagonal");
     (mean, root.transpose() * root)
 }

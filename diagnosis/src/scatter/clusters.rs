@@ -5,8 +5,10 @@
 //! its own in some cell. The strongest of all covariates is compared with that of passes shuffled and turned
 //! either way, so the level is that of the whole family.
 
+use crate::data::range;
 use crate::draws::split_mix;
 use crate::fit::Problem;
+use crate::kernel;
 use models::covariate::{COVARIATES, Role};
 
 /// Shuffles against which a table is held; fewer for long ones.
@@ -70,9 +72,7 @@ impl Space {
         let mut single: Vec<Cells> = Vec::new();
         let mut fine: Vec<Cells> = Vec::new();
         for c in COVARIATES {
-            let values: Option<Vec<f64>> =
-                problem.passes.iter().map(|q| c.of(q).map(|v| c.scaled(v, largest))).collect();
-            let Some(values) = values else { continue };
+            let Some(values) = kernel::scaled(c, &problem.passes, largest) else { continue };
             let Some(cells) = levels(&values, c.least_spread) else { continue };
             single.push(Cells::new(c.words.to_string(), cells));
             if matches!(c.role, Role::Time | Role::Place) && values.len() >= FINE * FEWEST {
@@ -177,8 +177,8 @@ fn scaled(values: &[f64], centre: f64) -> Option<Vec<f64>> {
 fn levels(values: &[f64], least_spread: f64) -> Option<Vec<usize>> {
     let z = scaled(values, mean(values))?;
     let spread = |list: &[f64]| {
-        list.iter().copied().fold(f64::NEG_INFINITY, f64::max)
-            - list.iter().copied().fold(f64::INFINITY, f64::min)
+        let [low, high] = range(list.iter().copied());
+        high - low
     };
     // In the covariate's own unit a deviation is its range over that of the scaled values.
     if spread(values) / spread(&z) <= least_spread {

@@ -4,11 +4,12 @@ use crate::constants::Constants;
 use crate::data::Table;
 use crate::discrepancy::Linear;
 use crate::fit::Problem;
-use crate::gaussian::Scaled;
+use crate::gaussian::{Scaled, rows_times};
 use crate::kernel::Lengths;
 use crate::layout::NUISANCES;
 use crate::scatter::lasting;
 use nalgebra::{DMatrix, DVector};
+use std::sync::Arc;
 
 /// Places of the scales on their grids.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -103,6 +104,7 @@ impl State {
 
 /// A surface at one smoothness: what is to be explained, and the columns that explain it.
 pub struct Surface {
+    constants: Arc<Constants>,
     linear: Linear,
     lateral: DVector<f64>,
     runs: Vec<usize>,
@@ -125,6 +127,7 @@ impl Surface {
     /// The surface of one smoothness.
     pub fn new(table: &Table, problem: &Problem, center: &[f64], lengths: Lengths) -> Self {
         Surface {
+            constants: problem.constants.clone(),
             linear: Linear::about(table, problem, center, lengths),
             lateral: DVector::from_column_slice(&problem.lateral),
             runs: table.runs.clone(),
@@ -149,14 +152,13 @@ impl Surface {
         if self.run_count > 0 {
             (0..n).for_each(|i| columns[(i, own + self.runs[i])] = level[i]);
         }
-        for mut c in columns.column_iter_mut() {
-            c.component_mul_assign(&root);
-        }
+        let columns = rows_times(columns, &root);
         let z = self.linear.residual.component_mul(&root);
         Whitened { gram: columns.tr_mul(&columns), score: columns.tr_mul(&z), z, columns }
     }
 
-    fn sizes(&self, k: &Constants, s: &State) -> Vec<f64> {
+    fn sizes(&self, s: &State) -> Vec<f64> {
+        let k = &*self.constants;
         let (r, scale) = (self.linear.kernel.rank(), s.scale(k));
         let parts = [(r, k.discrepancy_even[s.even]), (r, k.discrepancy_odd[s.odd]), (NUISANCES, 1.0)];
         let runs = (self.run_count, s.run(k));
@@ -170,46 +172,33 @@ impl Surface {
             .collect()
     }
 
-    fn log_posterior(&self, k: &Constants, w: &Whitened, s: &State) -> f64 {
-        let Some(parts) = Scaled::new(&w.gram, &w.score, self.sizes(k, s)) else { return f64::NEG_INFINITY };
-        let (n, scale) = (w.z.len() as f64, s.scale(k));
+    fn log_posterior(&self, w: &Whitened, s: &State) -> f64 {
+        let Some(parts) = Scaled::new(&w.gram, &w.score, self.sizes(s)) else { return f64::NEG_INFINITY };
+        let (n, scale) = (w.z.len() as f64, s.scale(&self.constants));
         let chi2 = (w.z.norm_squared() - parts.explained) / (scale * scale);
-        s.log_prior(k) - 0.5 * (chi2 + parts.log_det) - n * scale.ln()
+        s.log_prior(&self.constants) - 0.5 * (chi2 + parts.log_det) - n * scale.ln()
     }
 
     /// Climbs the marginal likelihood, prior included, from a state, a step of one scale at a time; its
     /// logarithm is up to what all states share.
-    pub fn climbed(
-        &self,
-        k: &Constants,
-        variance: &[f64],
-        weight: &[f64],
-        level: &[f64],
-        start: State,
-    ) -> (f64, State) {
+    pub fn climbed(&self, variance: &[f64], weight: &[f64], level: &[f64], start: State) -> (f64, State) {
         let w = self.whitened(variance, weight, level);
-        let found = self.climb(k, &w, start, |_| true);
-        let other = self.climb(k, &w, found.1.lasting(k), |_| true);
+        let found = self.climb(&w, start, |_| true);
+        let other = self.climb(&w, found.1.lasting(&self.constants), |_| true);
         if other.0 > found.0 { other } else { found }
     }
 
-    fn climb(
-        &self,
-        k: &Constants,
-        w: &Whitened,
-        start: State,
-        open: impl Fn(&State) -> bool,
-    ) -> (f64, State) {
-        let mut best = (self.log_posterior(k, w, &start), start);
+    fn climb(&self, w: &Whitened, start: State, open: impl Fn(&State) -> bool) -> (f64, State) {
+        let mut best = (self.log_posterior(w, &start), start);
         let mut tried = vec![start];
         for _ in 0..SWEEPS {
             let before = best.0;
-            for s in best.1.neighbours(k).into_iter().filter(&open) {
+            for s in best.1.neighbours(&self.constants).into_iter().filter(&open) {
                 if tried.contains(&s) {
                     continue;
                 }
                 tried.push(s);
-                let value = self.log_posterior(k, w, &s);
+                let value = self.log_posterior(w, &s);
                 if value > best.0 {
                     best = (value, s);
                 }
@@ -222,30 +211,23 @@ impl Surface {
     }
 
     /// The same of the recalibrated baseline alone, with the scale of the scatter that suits it.
-    pub fn bare(
-        &self,
-        k: &Constants,
-        variance: &[f64],
-        weight: &[f64],
-        level: &[f64],
-        s: &State,
-    ) -> (f64, State, f64) {
+    pub fn bare(&self, variance: &[f64], weight: &[f64], level: &[f64], s: &State) -> (f64, State, f64) {
         let w = self.whitened(variance, weight, level);
         let start = State { even: 0, odd: 0, ..*s };
         let (value, best) =
-            self.climb(k, &w, start, |s| (s.even, s.odd, s.slow, s.lasts) == (0, 0, start.slow, start.lasts));
-        (value, best, self.between(k, &w, best))
+            self.climb(&w, start, |s| (s.even, s.odd, s.slow, s.lasts) == (0, 0, start.slow, start.lasts));
+        (value, best, self.between(&w, best))
     }
 
     /// The best scale between the grid's places: a parabola through the logarithms of three of them.
-    fn between(&self, k: &Constants, w: &Whitened, best: State) -> f64 {
-        let at = best.scale;
+    fn between(&self, w: &Whitened, best: State) -> f64 {
+        let (k, at) = (&*self.constants, best.scale);
         if at == 0 || at + 1 == k.scatter_scales.len() {
             return best.scale(k);
         }
         let point = |scale: usize| {
             let s = State { scale, ..best };
-            (s.scale(k).ln(), self.log_posterior(k, w, &s))
+            (s.scale(k).ln(), self.log_posterior(w, &s))
         };
         let [(x0, y0), (x1, y1), (x2, y2)] = [at - 1, at, at + 1].map(point);
         let (left, right) = ((y1 - y0) / (x1 - x0), (y2 - y1) / (x2 - x1));
@@ -255,11 +237,11 @@ impl Surface {
     }
 
     /// The table beside the surface.
-    pub fn seen(&self, k: &Constants, variance: &[f64], weight: &[f64], level: &[f64], s: &State) -> Seen {
+    pub fn seen(&self, variance: &[f64], weight: &[f64], level: &[f64], s: &State) -> Seen {
         let w = self.whitened(variance, weight, level);
         let n = w.z.len();
-        let scale = s.scale(k);
-        let Some(parts) = Scaled::new(&w.gram, &w.score, self.sizes(k, s)) else {
+        let scale = s.scale(&self.constants);
+        let Some(parts) = Scaled::new(&w.gram, &w.score, self.sizes(s)) else {
             let none = vec![0.0; n];
             return Seen { left_out: none.clone(), beside: none, level: level.to_vec() };
         };

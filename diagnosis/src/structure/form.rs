@@ -1,31 +1,71 @@
 //! What a shape is made of: its form over a covariate, and what it is in proportion to.
 
+use super::axis::Axis;
+use crate::constants::Constants;
 use crate::discrepancy::scale;
 use crate::fit::Problem;
+use crate::kernel::{COUNT, Kernel};
 use effects::Input;
-use nalgebra::DVector;
+use nalgebra::{DMatrix, DVector};
 use std::f64::consts::PI;
+use std::sync::Arc;
 
 /// Where a shape is, in the covariate's scaled unit.
-#[derive(Debug, Clone, Copy)]
+#[derive(Debug, Clone)]
 pub(super) enum Form {
     /// From here on.
     From(f64),
     /// About here, with this deviation.
     About(f64, f64),
-    /// Turns per unit from a start, with a phase in turns.
-    Turns(f64, f64, f64),
+    /// Turns from a start, with a phase in turns; `log`: over the covariate whose logarithm the scale is.
+    Turns { length: f64, start: f64, phase: f64, log: bool },
+    /// Through a resonance here, of this half width, as it shows at a phase: 0 its peak, pi/2 the fall beside.
+    Through(f64, f64, f64),
+    /// Along from here, in this unit.
+    Along(f64, f64),
+    /// Within this of nought.
+    Within(f64),
+    /// Any function with this correlation length.
+    Any(Arc<Kernel>, f64),
 }
 
 impl Form {
-    /// Its value at a place.
-    pub(super) fn at(self, x: f64) -> f64 {
+    /// Its columns at some places; nothing where there is none.
+    pub(super) fn columns(&self, x: &[Option<f64>]) -> DMatrix<f64> {
+        let of = |value: &dyn Fn(f64) -> f64| DMatrix::from_fn(x.len(), 1, |i, _| x[i].map_or(0.0, value));
         match self {
-            Form::From(start) => f64::from(u8::from(x >= start)),
-            Form::About(middle, width) => (-0.5 * ((x - middle) / width).powi(2)).exp(),
-            Form::Turns(per_unit, start, phase) => (2.0 * PI * (per_unit * (x - start) + phase)).sin(),
+            Form::From(start) => of(&|x| f64::from(u8::from(x >= *start))),
+            Form::About(middle, width) => of(&|x| (-0.5 * ((x - middle) / width).powi(2)).exp()),
+            Form::Turns { length, start, phase, log } => {
+                let own = |x: f64| if *log { x.exp() } else { x };
+                of(&|x| (2.0 * PI * ((own(x) - start) / length + phase)).sin())
+            }
+            Form::Through(middle, width, phase) => {
+                let z = |x: f64| (x - middle) / width;
+                of(&|x| (phase.cos() + 2.0 * phase.sin() * z(x)) / (1.0 + z(x).powi(2)))
+            }
+            Form::Along(from, unit) => of(&|x| (x - from) / unit),
+            Form::Within(reach) => of(&|x| (-x / reach).exp()),
+            Form::Any(kernel, length) => {
+                let places: Vec<_> =
+                    x.iter().map(|x| on_a_line(x.unwrap_or(f64::INFINITY), *length)).collect();
+                kernel.matrix(&places)
+            }
         }
     }
+
+    /// A function of any form over some places, by a kernel of this length.
+    pub(super) fn any(x: &[f64], length: f64, k: &Constants) -> Form {
+        let places: Vec<_> = x.iter().map(|x| on_a_line(*x, length)).collect();
+        Form::Any(Arc::new(Kernel::new(&places, k.discrepancy_rank, k.kernel_rest)), length)
+    }
+}
+
+/// A place of a kernel that goes over one covariate.
+fn on_a_line(x: f64, length: f64) -> [f64; COUNT] {
+    let mut place = [0.0; COUNT];
+    place[0] = x / length;
+    place
 }
 
 /// What a shape is in proportion to.
@@ -54,12 +94,25 @@ impl Way {
 }
 
 /// Where the best of a shape's places is, and under which scatter.
-#[derive(Debug, Clone, Copy)]
+#[derive(Debug, Clone)]
 pub(super) struct Placement {
+    pub(super) axis: Axis,
     pub(super) form: Form,
     pub(super) way: Way,
     /// Deviation of its size, in units of the way.
     pub(super) sd: f64,
     /// Scale of independent scatter, and how many columns of what lasts it stands for; none as settled.
     pub(super) alone: Option<(f64, usize)>,
+}
+
+impl Placement {
+    /// Its columns at a problem's passes where the baseline predicts this, N, for weights of unit deviation.
+    pub(super) fn columns(&self, part: &Problem, u: &[f64], prediction: &DVector<f64>) -> DMatrix<f64> {
+        let largest = part.design.largest_amplitude_m;
+        let x: Vec<Option<f64>> = part.passes.iter().map(|p| self.axis.of(p, largest)).collect();
+        let signal = self.way.signal(part, u, prediction) * self.sd;
+        let mut columns = self.form.columns(&x);
+        columns.column_iter_mut().for_each(|mut c| c.component_mul_assign(&signal));
+        columns
+    }
 }

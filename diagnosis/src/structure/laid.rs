@@ -19,15 +19,10 @@ pub struct Laid {
 /// The baseline at a problem's passes, N, and the columns of the nuisances and of the shape.
 fn columns(shape: &Shape, problem: &Problem, centre: &[f64]) -> (DVector<f64>, DMatrix<f64>) {
     let prediction = problem.predict(&[], centre);
-    let signal = shape.best.way.signal(problem, centre, &prediction);
-    let largest = problem.design.largest_amplitude_m;
-    let form = |i: usize| {
-        // A shape over a covariate that a condition does not state is not there.
-        let value = shape.covariate.of(&problem.passes[i]);
-        value.map_or(0.0, |v| shape.best.form.at(shape.covariate.scaled(v, largest)))
-    };
-    let mut all = problem.jacobian(&[], centre, &prediction).resize_horizontally(NUISANCES + 1, 0.0);
-    (0..problem.len()).for_each(|i| all[(i, NUISANCES)] = form(i) * signal[i] * shape.best.sd);
+    let own = shape.best.columns(problem, centre, &prediction);
+    let nuisances = problem.jacobian(&[], centre, &prediction);
+    let mut all = nuisances.resize_horizontally(NUISANCES + own.ncols(), 0.0);
+    all.columns_mut(NUISANCES, own.ncols()).copy_from(&own);
     (prediction, all)
 }
 
@@ -42,7 +37,7 @@ impl Laid {
             Some((scale, lasting)) => independent(problem, scale, lasting).covariance(&columns),
             None => problem.covariance(&columns),
         };
-        let weights = covariance.weights(&residual).rows(0, NUISANCES + 1).into_owned();
+        let weights = covariance.weights(&residual).rows(0, columns.ncols()).into_owned();
         Laid { shape: shape.clone(), centre, covariance, weights }
     }
 

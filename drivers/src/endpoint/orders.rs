@@ -6,6 +6,8 @@
 
 use super::{ALARM_HOLDS, Endpoint, Part};
 use crate::Role;
+use crate::mailbox::Mailbox;
+use crate::ports::SetPoint;
 use instruments::{Profile, SetId};
 use realtime::ports::{Nanos, NoData};
 use ringbuf::traits::Producer;
@@ -37,6 +39,8 @@ struct Wanted {
 /// The orders of one instrument and what it showed of them.
 #[derive(Debug, Default)]
 pub(super) struct Orders {
+    /// Out of the loop; a sensor's stays empty.
+    commands: Mailbox<SetPoint>,
     wanted: Option<Wanted>,
     /// An order that drives or moves was handed out, and the instrument has not shown 'off' since.
     driven: bool,
@@ -51,6 +55,10 @@ pub(super) struct Orders {
 }
 
 impl Orders {
+    pub(super) fn of(commands: Mailbox<SetPoint>) -> Self {
+        Self { commands, ..Self::default() }
+    }
+
     /// A state came: whether the instrument drives or moves.
     pub(super) fn read_back(&mut self, on: bool, arrived: Nanos) {
         self.shown = Some((on, arrived));
@@ -81,9 +89,9 @@ impl Endpoint {
                 }
                 ring.try_push(*last).is_ok()
             }
-            Part::Amplifier { link, .. } => link.states.try_push(Err(reason)).is_ok(),
-            Part::Stage { link, .. } => link.states.try_push(Err(reason)).is_ok(),
-            Part::Supply { link, .. } => link.states.try_push(Err(reason)).is_ok(),
+            Part::Amplifier { states, .. } => states.try_push(Err(reason)).is_ok(),
+            Part::Stage { states, .. } => states.try_push(Err(reason)).is_ok(),
+            Part::Supply { states, .. } => states.try_push(Err(reason)).is_ok(),
             Part::Contacts(contacts) => {
                 contacts.lost(reason);
                 true
@@ -93,12 +101,7 @@ impl Endpoint {
 
     /// Drops all commands that wait.
     pub fn discard_commands(&mut self) {
-        match &self.part {
-            Part::Force { .. } | Part::Contacts(_) => {}
-            Part::Amplifier { link, .. } => link.commands.drop_waiting(),
-            Part::Stage { link, .. } => link.commands.drop_waiting(),
-            Part::Supply { link, .. } => link.commands.drop_waiting(),
-        }
+        self.orders.commands.drop_waiting();
         self.orders.wanted = None;
     }
 
@@ -106,7 +109,7 @@ impl Endpoint {
     /// set-points, where the instrument has been on and has not shown since that it is off.
     pub fn due(&mut self, now: Nanos) -> Due {
         let newest = self.newest_command();
-        let off_came = self.take_off();
+        let off_came = self.orders.commands.take_off();
         if let Some(newest) = newest {
             self.orders.wanted = Some(newest);
         }
@@ -164,7 +167,7 @@ impl Endpoint {
                 self.orders.wanted.as_ref().is_some_and(|wanted| wanted.set_points == newest.set_points);
             self.orders.wanted = Some(newest);
         }
-        !self.off_waits()
+        !self.orders.commands.off_waits()
             && self.orders.wanted.as_ref().is_some_and(|wanted| wanted.on && now <= wanted.expires_at)
     }
 
@@ -183,7 +186,7 @@ impl Endpoint {
         self.orders.wanted = None;
         self.orders.off_sent = Some(now);
         self.orders.refused = false;
-        let _ = self.take_off();
+        let _ = self.orders.commands.take_off();
         self.health.count(&self.health.safe_sent);
         self.safe_set_points()
     }
@@ -240,77 +243,30 @@ impl Endpoint {
         if self.owes_off() { Due::Safe(self.hand_out_off(now)) } else { Due::Nothing }
     }
 
-    fn take_off(&self) -> bool {
-        match &self.part {
-            Part::Force { .. } | Part::Contacts(_) => false,
-            Part::Amplifier { link, .. } => link.commands.take_off(),
-            Part::Stage { link, .. } => link.commands.take_off(),
-            Part::Supply { link, .. } => link.commands.take_off(),
-        }
-    }
-
-    fn off_waits(&self) -> bool {
-        match &self.part {
-            Part::Force { .. } | Part::Contacts(_) => false,
-            Part::Amplifier { link, .. } => link.commands.off_waits(),
-            Part::Stage { link, .. } => link.commands.off_waits(),
-            Part::Supply { link, .. } => link.commands.off_waits(),
-        }
-    }
-
-    fn newest_command(&mut self) -> Option<Wanted> {
+    fn newest_command(&self) -> Option<Wanted> {
+        let SetPoint { values, on, sequence, expires_at } = self.orders.commands.take()?;
         let profile = &self.profile;
-        let set = |name: &str, si: f64| {
-            profile.set(name).map(|set| (set, si / profile.description.set[set.0].si.factor))
-        };
-        match &self.part {
-            Part::Force { .. } | Part::Contacts(_) => None,
-            Part::Supply { link, .. } => {
-                let command = link.commands.take()?;
-                let set_points = set("closed", f64::from(u8::from(command.closed))).into_iter().collect();
-                Some(Wanted { set_points, on: command.closed, expires_at: command.expires_at, sent: false })
-            }
-            Part::Amplifier { link, .. } => {
-                let command = link.commands.take()?;
-                let mut set_points = if command.enable {
-                    let wanted = [
-                        set("amplitude", command.amplitude_pp_m),
-                        set("frequency", command.frequency_hz),
-                        set("enable", 1.0),
-                    ];
-                    wanted.into_iter().flatten().collect()
-                } else {
-                    // Off leaves the frequency as it is: there may be no valid one.
-                    safe_set_points(profile)
-                };
-                set_points.extend(heartbeat(profile, command.sequence));
-                Some(Wanted { set_points, on: command.enable, expires_at: command.expires_at, sent: false })
-            }
-            Part::Stage { link, dead_weight_n, .. } => {
-                let command = link.commands.take()?;
-                let wanted = command.normal_force_n;
-                if let Some(weight) =
-                    dead_weight_n.filter(|weight| wanted != 0.0 && (wanted - weight).abs() > 1e-6)
-                {
-                    let text = format!("the load stands on a weight of {weight} N: {wanted} N cannot be had");
-                    self.health.count(&self.health.commands_refused);
-                    self.health.problem(text);
-                    return None;
-                }
-                let wanted = [
-                    set("velocity", command.velocity_m_s),
-                    set("load", command.normal_force_n),
-                    set("enable", f64::from(u8::from(!command.rests()))),
-                    heartbeat(profile, command.sequence),
-                ];
-                Some(Wanted {
-                    set_points: wanted.into_iter().flatten().collect(),
-                    on: !command.rests(),
-                    expires_at: command.expires_at,
-                    sent: false,
-                })
-            }
+        if let Part::Stage { dead_weight_n: Some(weight), .. } = self.part
+            && let Some((_, wanted)) = values.into_iter().find(|(name, _)| *name == "load")
+            && wanted != 0.0
+            && (wanted - weight).abs() > 1e-6
+        {
+            let text = format!("the load stands on a weight of {weight} N: {wanted} N cannot be had");
+            self.health.count(&self.health.commands_refused);
+            self.health.problem(text);
+            return None;
         }
+        let mut set_points: Vec<(SetId, f64)> = if !on && matches!(self.part, Part::Amplifier { .. }) {
+            // Off leaves the frequency as it is: there may be no valid one.
+            safe_set_points(profile)
+        } else {
+            let set = |(name, si)| {
+                profile.set(name).map(|set| (set, si / profile.description.set[set.0].si.factor))
+            };
+            values.into_iter().filter_map(set).collect()
+        };
+        set_points.extend(sequence.and_then(|count| heartbeat(profile, count)));
+        Some(Wanted { set_points, on, expires_at, sent: false })
     }
 }
 

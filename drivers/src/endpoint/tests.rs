@@ -1,10 +1,31 @@
 use super::*;
-use crate::ports::DriveSetPoint;
 use crate::profile;
 
 pub(crate) fn amplifier() -> (Endpoint, AmplifierPort) {
     Endpoint::amplifier(profile("muprime-amplifier").unwrap(), &InstrumentSetup::new("muprime-amplifier", ""))
         .unwrap()
+}
+
+/// What the loop wants of the amplifier. Only the loop can make a command that drives.
+pub(crate) struct DriveSetPoint {
+    pub amplitude_pp_m: f64,
+    pub frequency_hz: f64,
+    pub enable: bool,
+    pub sequence: u32,
+    pub expires_at: Nanos,
+}
+
+impl From<DriveSetPoint> for SetPoint {
+    fn from(of: DriveSetPoint) -> Self {
+        let (on, sequence) = (of.enable, Some(of.sequence));
+        let drive = [("amplitude", of.amplitude_pp_m), ("frequency", of.frequency_hz)];
+        SetPoint {
+            values: [drive[0], drive[1], ("enable", f64::from(on))],
+            on,
+            sequence,
+            expires_at: of.expires_at,
+        }
+    }
 }
 
 pub(crate) fn on(sequence: u32, expires_at: u64) -> DriveSetPoint {

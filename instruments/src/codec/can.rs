@@ -39,10 +39,7 @@ impl CanFrame {
 /// The letter that sets an adapter's bit rate; `None` for one that the protocol does not know.
 pub fn slcan_speed(bits_per_second: u32) -> Option<u8> {
     let speeds = [10_000, 20_000, 50_000, 100_000, 125_000, 250_000, 500_000, 800_000, 1_000_000];
-    speeds
-        .iter()
-        .position(|&speed| speed == bits_per_second)
-        .map(|index| b'0' + u8::try_from(index).unwrap_or(0))
+    (b'0'..).zip(speeds).find(|(_, speed)| *speed == bits_per_second).map(|(letter, _)| letter)
 }
 
 /// A frame as the adapter's line, with its end.
@@ -57,20 +54,8 @@ pub fn slcan_line(frame: &CanFrame) -> Vec<u8> {
     line.into_bytes()
 }
 
-/// What an adapter says.
-#[derive(Debug, Clone, PartialEq, Eq)]
-pub enum SlcanMessage {
-    /// A frame came.
-    Frame(CanFrame),
-    /// The last command was taken.
-    Done,
-    /// The last command was refused (bell).
-    Refused,
-    /// Something else: a version, a serial number, a remote frame, or damaged bytes.
-    Other,
-}
-
-/// Cuts the bytes of an adapter into what it says.
+/// Finds the frames in the bytes of an adapter. The rest is not needed: whether a command was taken, a
+/// version, a serial number, remote frames, damaged bytes.
 #[derive(Debug, Clone, Default)]
 pub struct SlcanReader {
     line: Vec<u8>,
@@ -81,17 +66,15 @@ pub struct SlcanReader {
 const LONGEST_LINE: usize = 30;
 
 impl SlcanReader {
-    /// Takes bytes as they come and gives each message to `sink`.
-    pub fn push(&mut self, bytes: &[u8], mut sink: impl FnMut(SlcanMessage)) {
+    /// Takes bytes as they come and gives each frame to `sink`.
+    pub fn push(&mut self, bytes: &[u8], mut sink: impl FnMut(CanFrame)) {
         for &byte in bytes {
             match byte {
-                b'\r' => {
-                    sink(if self.overlong { SlcanMessage::Other } else { understand(&self.line) });
-                    self.line.clear();
-                    self.overlong = false;
-                }
-                0x07 => {
-                    sink(SlcanMessage::Refused);
+                // The end of a line, or the bell of a refusal.
+                b'\r' | 0x07 => {
+                    if let Some(frame) = frame(&self.line).filter(|_| byte == b'\r' && !self.overlong) {
+                        sink(frame);
+                    }
                     self.line.clear();
                     self.overlong = false;
                 }
@@ -102,17 +85,13 @@ impl SlcanReader {
     }
 }
 
-fn understand(line: &[u8]) -> SlcanMessage {
-    match line.first() {
-        None => SlcanMessage::Done,
-        Some(b'z' | b'Z') if line.len() == 1 => SlcanMessage::Done,
-        Some(b't') => frame(line, 3, false).map_or(SlcanMessage::Other, SlcanMessage::Frame),
-        Some(b'T') => frame(line, 8, true).map_or(SlcanMessage::Other, SlcanMessage::Frame),
-        Some(_) => SlcanMessage::Other,
-    }
-}
-
-fn frame(line: &[u8], digits: usize, extended: bool) -> Option<CanFrame> {
+fn frame(line: &[u8]) -> Option<CanFrame> {
+    let extended = match line.first()? {
+        b't' => false,
+        b'T' => true,
+        _ => return None,
+    };
+    let digits = if extended { 8 } else { 3 };
     let hex = |bytes: &[u8]| {
         bytes.iter().try_fold(0_u32, |sum, &byte| Some(sum << 4 | char::from(byte).to_digit(16)?))
     };
@@ -133,7 +112,7 @@ fn frame(line: &[u8], digits: usize, extended: bool) -> Option<CanFrame> {
 mod tests {
     use super::*;
 
-    fn decoded(bytes: &[u8]) -> Vec<SlcanMessage> {
+    fn decoded(bytes: &[u8]) -> Vec<CanFrame> {
         let (mut reader, mut all) = (SlcanReader::default(), Vec::new());
         reader.push(bytes, |one| all.push(one));
         all
@@ -143,22 +122,22 @@ mod tests {
     fn lines_both_ways() {
         let frame = CanFrame::new(0x1B4, &[0x02]).unwrap();
         assert_eq!(slcan_line(&frame), b"t1B4102\r");
-        assert_eq!(decoded(b"t1B4102\r"), [SlcanMessage::Frame(frame)]);
-        assert_eq!(decoded(b"t1b410200FF\r"), [SlcanMessage::Frame(frame)], "with a time stamp");
+        assert_eq!(decoded(b"t1B4102\r"), [frame]);
+        assert_eq!(decoded(b"t1b410200FF\r"), [frame], "with a time stamp");
         let long = CanFrame::build(0x0123_4567, true, &[1, 2, 3, 4, 5, 6, 7, 8]).unwrap();
         assert_eq!(slcan_line(&long), b"T0123456780102030405060708\r");
-        assert_eq!(decoded(&slcan_line(&long)), [SlcanMessage::Frame(long)]);
+        assert_eq!(decoded(&slcan_line(&long)), [long]);
     }
 
     #[test]
     fn what_is_no_frame_is_none() {
-        assert_eq!(decoded(b"z\r\r\x07"), [SlcanMessage::Done, SlcanMessage::Done, SlcanMessage::Refused]);
+        assert_eq!(decoded(b"z\r\r\x07t1B4102\x07"), []);
         for line in ["t1B49\r", "t1B41\r", "tXYZ0\r", "t1B4102000\r", "V1013\r", "T1B4102\r", "t8001FF\r"] {
-            assert_eq!(decoded(line.as_bytes()), [SlcanMessage::Other], "{line}");
+            assert_eq!(decoded(line.as_bytes()), [], "{line}");
         }
         let mut noise = vec![b'0'; 100_000];
         noise.extend(b"\rt1B4102\r");
-        assert_eq!(decoded(&noise).len(), 2, "an endless line is one message");
+        assert_eq!(decoded(&noise).len(), 1, "an endless line ends with its own end");
     }
 
     #[test]

@@ -3,22 +3,9 @@
 
 use super::can::CanFrame;
 
-/// A command of network management for one node.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub enum Nmt {
-    /// To operational.
-    Start = 0x01,
-    /// To stopped.
-    Stop = 0x02,
-    /// To pre-operational.
-    PreOperational = 0x80,
-    /// The node starts anew.
-    Reset = 0x81,
-}
-
-/// The frame of a network command.
-pub fn nmt(command: Nmt, node: u8) -> CanFrame {
-    frame(0, &[command as u8, node])
+/// The network command that makes a node operational.
+pub fn start(node: u8) -> CanFrame {
+    frame(0, &[0x01, node])
 }
 
 fn frame(id: u32, data: &[u8]) -> CanFrame {
@@ -184,11 +171,8 @@ impl DriveState {
             return Self::Disabled;
         }
         if control & 0x04 == 0 {
-            return if matches!(self, Self::Enabled | Self::QuickStop) {
-                Self::QuickStop
-            } else {
-                Self::Disabled
-            };
+            let stops = matches!(self, Self::Enabled | Self::QuickStop);
+            return if stops { Self::QuickStop } else { Self::Disabled };
         }
         match (self, control & 0x0F) {
             (Self::Disabled | Self::Ready | Self::On | Self::Enabled, 0x06) => Self::Ready,

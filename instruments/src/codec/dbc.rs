@@ -251,11 +251,8 @@ fn place(
         factor: signal.factor,
         offset: signal.offset,
     };
-    if place.fits(length) {
-        Ok(place)
-    } else {
-        Err(DbcError::Outside { line, signal: name(), message: message.name.clone() })
-    }
+    let outside = || DbcError::Outside { line, signal: name(), message: message.name.clone() };
+    Some(place).filter(|place| place.fits(length)).ok_or_else(outside)
 }
 
 impl DbcMessage {
@@ -272,21 +269,21 @@ impl DbcSignal {
     }
 
     fn fits(&self, length: usize) -> bool {
-        (1..=64).contains(&self.size) && self.bits().all(|bit| bit.is_some_and(|bit| bit / 8 < length))
+        (1..=64).contains(&self.size) && self.bits().all(|bit| bit / 8 < length)
     }
 
     /// Places of the bits in the frame, the least significant first: byte times 8 plus bit.
-    fn bits(&self) -> impl Iterator<Item = Option<usize>> {
-        let (start, size, little_endian) =
-            (usize::from(self.start), usize::from(self.size), self.little_endian);
+    fn bits(&self) -> impl Iterator<Item = usize> {
+        let (start, size) = (usize::from(self.start), usize::from(self.size));
+        let little_endian = self.little_endian;
         (0..size).map(move |significance| {
             if little_endian {
-                return Some(start + significance);
+                return start + significance;
             }
             // Motorola counts from the most significant bit towards the right: bit 0 of a byte is
             // followed by bit 7 of the next. Counted from the left of the frame that is plain.
             let from_left = (start / 8) * 8 + (7 - start % 8) + (size - 1 - significance);
-            Some((from_left / 8) * 8 + (7 - from_left % 8))
+            (from_left / 8) * 8 + (7 - from_left % 8)
         })
     }
 
@@ -307,7 +304,6 @@ impl DbcSignal {
     pub fn raw(&self, frame: &[u8]) -> Option<i64> {
         let mut word: u64 = 0;
         for (significance, bit) in self.bits().enumerate() {
-            let bit = bit?;
             word |= u64::from((frame.get(bit / 8)? >> (bit % 8)) & 1) << significance;
         }
         let unused = 64 - u32::from(self.size);
@@ -331,8 +327,8 @@ impl DbcSignal {
             (false, _) => raw.clamp(low, high) as i128 as u64,
         };
         for (significance, bit) in self.bits().enumerate() {
-            let Some(byte) = bit.and_then(|bit| frame.get_mut(bit / 8)) else { return false };
-            let bit = bit.unwrap_or(0) % 8;
+            let Some(byte) = frame.get_mut(bit / 8) else { return false };
+            let bit = bit % 8;
             *byte = (*byte & !(1 << bit)) | ((((word >> significance) & 1) as u8) << bit);
         }
         true

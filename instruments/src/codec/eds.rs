@@ -184,10 +184,8 @@ fn default_of(text: &str) -> Option<DefaultValue> {
     if upper == "$NODEID" {
         return Some(DefaultValue { value: 0, plus_node: true });
     }
-    match without {
-        Some(rest) => number(&rest.replace("0X", "0x")).map(|value| DefaultValue { value, plus_node: true }),
-        None => number(&upper.replace("0X", "0x")).map(|value| DefaultValue { value, plus_node: false }),
-    }
+    let plus_node = without.is_some();
+    number(without.unwrap_or(&upper)).map(|value| DefaultValue { value, plus_node })
 }
 
 /// What a process data frame holds: each object with its first byte. `first` is 0x1800 for what the node
@@ -204,12 +202,8 @@ pub fn mapping(objects: &Objects, first: u16, cob: u32) -> Result<(Vec<(Key, usi
     // A sheet that was configured for one node may state its identifier as a whole; only what the base of a
     // frame leaves can be a node's number.
     let of_node = |d: &DefaultValue| {
-        let id = d.value & 0x7FF;
-        id == i64::from(cob)
-            || !d.plus_node
-                && id > i64::from(cob)
-                && id <= i64::from(cob) + 127
-                && id & !127 == i64::from(cob)
+        let (id, cob) = (d.value & 0x7FF, i64::from(cob));
+        id == cob || !d.plus_node && id > cob && id <= cob + 127 && id & !127 == cob
     };
     // Bits 31 and 30 say 'not used' and 'no remote request'.
     let (off, on): (Vec<_>, Vec<_>) =

@@ -11,16 +11,12 @@ use super::checksum::crc16_modbus;
 #[derive(Debug, Clone, Copy, PartialEq, Eq, thiserror::Error)]
 #[allow(missing_docs, reason = "the message of an error says what its fields are")]
 pub enum RtuError {
-    /// The instrument refused, with its exception code.
     #[error("the instrument refused the request (exception {0})")]
     Exception(u8),
-    /// The check bytes do not fit.
     #[error("the check bytes do not fit the frame")]
     Crc,
-    /// Another unit answered.
     #[error("unit {found} answered instead of unit {expected}")]
     Unit { expected: u8, found: u8 },
-    /// The answer is one to another request.
     #[error("the answer is to function {found}, not {expected}")]
     Function { expected: u8, found: u8 },
     /// The answer speaks of another length or another register.
@@ -49,11 +45,27 @@ fn closed(mut body: Vec<u8>) -> Vec<u8> {
     body
 }
 
+/// The beginning of a frame that speaks of `second`, mostly a count, at an address.
+fn addressed(unit: u8, function: u8, address: u16, second: u16) -> Vec<u8> {
+    let ([a, b], [c, d]) = (address.to_be_bytes(), second.to_be_bytes());
+    vec![unit, function, a, b, c, d]
+}
+
+/// Writes what `data` holds of so many neighbouring registers or coils.
+fn writing(unit: u8, function: u8, address: u16, registers: usize, data: &[u8]) -> Request {
+    let mut body = addressed(unit, function, address, u16::try_from(registers).unwrap_or(u16::MAX));
+    body.push(u8::try_from(data.len()).unwrap_or(u8::MAX));
+    body.extend(data);
+    Request { bytes: closed(body), answer_length: 8 }
+}
+
+fn bytes_of(registers: &[u16]) -> Vec<u8> {
+    registers.iter().flat_map(|register| register.to_be_bytes()).collect()
+}
+
 /// Asks for registers by function 3 or 4, or for bits by function 1 or 2.
 pub fn read(unit: u8, function: u8, address: u16, count: u16) -> Request {
-    let mut body = vec![unit, function];
-    body.extend(address.to_be_bytes());
-    body.extend(count.to_be_bytes());
+    let body = addressed(unit, function, address, count);
     let count = usize::from(count);
     let data = if function <= 2 { count.div_ceil(8) } else { 2 * count };
     Request { bytes: closed(body), answer_length: 5 + data }
@@ -61,13 +73,7 @@ pub fn read(unit: u8, function: u8, address: u16, count: u16) -> Request {
 
 /// Writes neighbouring coils by function 15: those whose register is not zero are closed.
 pub fn write_coils(unit: u8, address: u16, registers: &[u16]) -> Request {
-    let count = u16::try_from(registers.len()).unwrap_or(u16::MAX);
-    let mut body = vec![unit, 15];
-    body.extend(address.to_be_bytes());
-    body.extend(count.to_be_bytes());
-    body.push(u8::try_from(registers.len().div_ceil(8)).unwrap_or(u8::MAX));
-    body.extend(to_bits(registers));
-    Request { bytes: closed(body), answer_length: 8 }
+    writing(unit, 15, address, registers.len(), &to_bits(registers))
 }
 
 /// Registers of 0 and not 0 as bits, the first in the lowest bit of the first byte.
@@ -85,20 +91,12 @@ pub fn from_bits(bits: &[u8], count: usize) -> Vec<u16> {
 
 /// Writes neighbouring registers by function 16.
 pub fn write(unit: u8, address: u16, registers: &[u16]) -> Request {
-    let count = u16::try_from(registers.len()).unwrap_or(u16::MAX);
-    let mut body = vec![unit, 16];
-    body.extend(address.to_be_bytes());
-    body.extend(count.to_be_bytes());
-    body.push(u8::try_from(2 * registers.len()).unwrap_or(u8::MAX));
-    body.extend(registers.iter().flat_map(|register| register.to_be_bytes()));
-    Request { bytes: closed(body), answer_length: 8 }
+    writing(unit, 16, address, registers.len(), &bytes_of(registers))
 }
 
 /// A request by a function of the maker's own: `data` follows the function code.
 pub fn custom(unit: u8, function: u8, data: &[u8], answer_length: usize) -> Request {
-    let mut body = vec![unit, function];
-    body.extend(data);
-    Request { bytes: closed(body), answer_length }
+    Request { bytes: closed([&[unit, function], data].concat()), answer_length }
 }
 
 /// How many bytes the answer that begins with `start` has; `None` until two bytes are there.
@@ -135,10 +133,8 @@ pub fn payload<'a>(request: &Request, answer: &'a [u8]) -> Result<&'a [u8], RtuE
     Ok(&body[2..])
 }
 
-/// The registers of an answer to [`read()`], as bytes; bits come as registers of 0 and 1.
-///
-/// # Errors
-/// Whatever does not fit the request.
+/// The registers of an answer to [`read()`], judged as by [`payload`], as bytes; bits come as registers of 0
+/// and 1.
 pub fn registers(request: &Request, answer: &[u8]) -> Result<Vec<u8>, RtuError> {
     let payload = payload(request, answer)?;
     if usize::from(payload[0]) != payload.len() - 1 {
@@ -146,16 +142,12 @@ pub fn registers(request: &Request, answer: &[u8]) -> Result<Vec<u8>, RtuError> 
     }
     if request.bytes[1] <= 2 {
         let count = u16::from_be_bytes([request.bytes[4], request.bytes[5]]);
-        let registers = from_bits(&payload[1..], usize::from(count));
-        return Ok(registers.iter().flat_map(|register| register.to_be_bytes()).collect());
+        return Ok(bytes_of(&from_bits(&payload[1..], usize::from(count))));
     }
     Ok(payload[1..].to_vec())
 }
 
-/// Judges an answer to [`write()`]: it repeats the address and the count.
-///
-/// # Errors
-/// Whatever does not fit the request.
+/// Judges an answer to [`write()`] as [`payload`] does; it repeats the address and the count.
 pub fn written(request: &Request, answer: &[u8]) -> Result<(), RtuError> {
     if payload(request, answer)? == &request.bytes[2..6] { Ok(()) } else { Err(RtuError::Mismatch) }
 }
@@ -245,22 +237,14 @@ pub fn hear(bytes: &[u8], own: &[u8]) -> Heard {
 
 /// The answer that gives registers, as bits where the function is one of bits.
 pub fn give(unit: u8, function: u8, registers: &[u16]) -> Vec<u8> {
-    if function <= 2 {
-        let bits = to_bits(registers);
-        let head = [unit, function, u8::try_from(bits.len()).unwrap_or(u8::MAX)];
-        return closed([&head, bits.as_slice()].concat());
-    }
-    let mut body = vec![unit, function, u8::try_from(2 * registers.len()).unwrap_or(u8::MAX)];
-    body.extend(registers.iter().flat_map(|register| register.to_be_bytes()));
-    closed(body)
+    let data = if function <= 2 { to_bits(registers) } else { bytes_of(registers) };
+    let head = [unit, function, u8::try_from(data.len()).unwrap_or(u8::MAX)];
+    closed([&head, data.as_slice()].concat())
 }
 
 /// The answer that confirms a write: the first four bytes after the function of the request.
 pub fn confirm(unit: u8, function: u8, address: u16, second: u16) -> Vec<u8> {
-    let mut body = vec![unit, function];
-    body.extend(address.to_be_bytes());
-    body.extend(second.to_be_bytes());
-    closed(body)
+    closed(addressed(unit, function, address, second))
 }
 
 /// The answer to a function of the maker's own.

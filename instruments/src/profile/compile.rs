@@ -56,8 +56,8 @@ impl Compiler<'_> {
         let faults = d.fault.iter().map(|f| condition(&f.when)).collect::<Result<_, _>>()?;
         for set in &d.set {
             if let Some(echo) = set.echo.as_ref().filter(|echo| index(echo).is_none()) {
-                let message =
-                    format!("the echo of set-point `{}`, `{echo}`, is not a signal", set.name.as_ref());
+                let name = set.name.as_ref();
+                let message = format!("the echo of set-point `{name}`, `{echo}`, is not a signal");
                 return Err(self.at_name(&set.name, message));
             }
         }
@@ -117,8 +117,9 @@ impl Compiler<'_> {
         for (first, cob, length) in sent.chain(taken) {
             let (_, mapped) = eds::mapping(&sheet, first, cob).map_err(|why| error(&why))?;
             if mapped != length {
-                let why = format!("the frame {cob:#x} has {mapped} bytes, the profile says {length}");
-                return Err(error(&why));
+                return Err(error(&format!(
+                    "the frame {cob:#x} has {mapped} bytes, the profile says {length}"
+                )));
             }
         }
         Ok(sheet)
@@ -189,16 +190,12 @@ impl Compiler<'_> {
             frames.push(Frame { text, ..Frame::new(query.name.as_ref(), bytes, FrameKind::Query(i)) });
         }
         let mut seen = std::collections::HashSet::new();
-        let names = frames
-            .iter()
-            .map(|frame| frame.name.as_str())
-            .chain(d.write.iter().map(|w| w.name.as_ref().as_str()));
-        for name in names {
-            if !seen.insert(name) {
-                let place = self.text.rfind(&format!("\"{name}\"")).map(|at| at..at + name.len() + 2);
-                let why = format!("a second frame or block is called `{name}`");
-                return Err(ProfileError::at(self.text, place, why));
-            }
+        let blocks = d.write.iter().map(|block| block.name.as_ref().as_str());
+        let mut names = frames.iter().map(|frame| frame.name.as_str()).chain(blocks);
+        if let Some(name) = names.find(|name| !seen.insert(*name)) {
+            let place = self.text.rfind(&format!("\"{name}\"")).map(|at| at..at + name.len() + 2);
+            let why = format!("a second frame or block is called `{name}`");
+            return Err(ProfileError::at(self.text, place, why));
         }
         Ok(frames)
     }
@@ -215,16 +212,13 @@ impl Compiler<'_> {
             return Err(wrong(format!("message group `{name}` needs `replies` or `cob`")));
         }
         let part = |reply: &String| {
-            let message = messages
-                .get(reply)
-                .ok_or_else(|| wrong(format!("`{reply}` of `{name}` is not a message of the DBC file")))?;
+            let missing = || wrong(format!("`{reply}` of `{name}` is not a message of the DBC file"));
+            let message = messages.get(reply).ok_or_else(missing)?;
             if let Some(fault) = &message.fault {
                 return Err(wrong(format!("`{reply}` of `{name}` cannot be used: {fault}")));
             }
-            let id = message
-                .id
-                .checked_sub(group.dbc_base.unwrap_or(0))
-                .ok_or_else(|| wrong(format!("the identifier of `{reply}` is below `dbc_base`")))?;
+            let id = message.id.checked_sub(group.dbc_base.unwrap_or(0));
+            let id = id.ok_or_else(|| wrong(format!("the identifier of `{reply}` is below `dbc_base`")))?;
             if message.length > 8 {
                 let why = format!("`{reply}` has {} bytes: CAN FD is not supported", message.length);
                 return Err(wrong(why));
@@ -238,8 +232,7 @@ impl Compiler<'_> {
         };
         let parts: Vec<Part> = group.replies.iter().map(part).collect::<Result<_, _>>()?;
         if group.multiplex.is_some() && parts.iter().all(|part| part.selector.is_none()) {
-            let why = format!("`multiplex` of `{name}`: none of its messages has a multiplexor");
-            return Err(wrong(why));
+            return Err(wrong(format!("`multiplex` of `{name}`: none of its messages has a multiplexor")));
         }
         Ok(parts)
     }
@@ -262,10 +255,8 @@ impl Compiler<'_> {
             wanted.push(Span { address, count });
         }
         if wanted.is_empty() {
-            let why = format!(
-                "poll `{name}` needs `address` and `count`, or signals with an `address` of their own"
-            );
-            return Err(self.at_name(&poll.name, why));
+            let needs = "needs `address` and `count`, or signals with an `address` of their own";
+            return Err(self.at_name(&poll.name, format!("poll `{name}` {needs}")));
         }
         Ok(Span::cover(wanted, poll.gap))
     }
@@ -292,6 +283,7 @@ impl Compiler<'_> {
     ) -> Result<CompiledSignal, ProfileError> {
         let name = s.name.as_ref();
         let wrong = |why: String| self.at_name(&s.name, why);
+        let in_signal = |why| wrong(format!("signal `{name}`: {why}"));
         let frame = match &s.frame {
             Some(wanted) => frames
                 .iter()
@@ -307,8 +299,7 @@ impl Compiler<'_> {
                 let mut holding = (0..frames.len()).filter(|&i| holds(&frames[i]));
                 let (Some(one), None) = (holding.next(), holding.next()) else {
                     let names: Vec<&str> = frames.iter().map(|frame| frame.name.as_str()).collect();
-                    let message = format!("signal `{name}` needs `frame`, one of {}", names.join(", "));
-                    return Err(wrong(message));
+                    return Err(wrong(format!("signal `{name}` needs `frame`, one of {}", names.join(", "))));
                 };
                 one
             }
@@ -327,12 +318,11 @@ impl Compiler<'_> {
                     let message = format!("signal `{name}` is worked out: it stands nowhere and has no type");
                     return Err(wrong(message));
                 }
-                let why = |why| wrong(format!("signal `{name}`: {why}"));
-                Place::Computed(Expression::compile(value, index).map_err(why)?)
+                Place::Computed(Expression::compile(value, index).map_err(in_signal)?)
             }
         };
         if let Place::Bytes(field) = &place {
-            self.check_field(field, frames[frame].bytes, s.name.span(), name)?;
+            self.check_field(field, frames[frame].bytes, &s.name)?;
         }
         if s.scale == 0.0 || !s.scale.is_finite() || !s.si.factor.is_finite() || s.si.factor == 0.0 {
             return Err(wrong(format!("a scale of signal `{name}` is zero or not finite")));
@@ -341,8 +331,7 @@ impl Compiler<'_> {
             return Err(wrong(format!("the range of signal `{name}` is empty")));
         }
         let compile = |text: &Option<String>| {
-            let why = |why| wrong(format!("signal `{name}`: {why}"));
-            text.as_ref().map(|text| Expression::compile(text, index).map_err(why)).transpose()
+            text.as_ref().map(|text| Expression::compile(text, index).map_err(in_signal)).transpose()
         };
         if s.resolution_si.is_some_and(|step| !(step.is_finite() && step > 0.0)) {
             return Err(wrong(format!("`resolution_si` of signal `{name}` must be above zero")));
@@ -384,23 +373,18 @@ impl Compiler<'_> {
             let FrameKind::Messages(group, _) = frame.kind else { return Err(unknown()) };
             let replies = &self.description.message[group].replies;
             let of_group = self.description.message[group].multiplex;
-            let (why, help) = match signal.multiplex {
-                Multiplex::Where(value) if of_group != Some(value) => (
-                    format!(
-                        "`{path}` of signal `{name}` is multiplexed: it is there only where the multiplexor is {value}"
-                    ),
-                    format!("put it into a [[message]] of its own with `multiplex = {value}`"),
-                ),
-                Multiplex::Nested => (
-                    format!(
-                        "`{path}` of signal `{name}` is multiplexed by ranges or in two steps (SG_MUL_VAL_), which is not supported"
-                    ),
-                    "choose a message that always has it".to_string(),
-                ),
-                _ => (String::new(), String::new()),
-            };
-            if !why.is_empty() {
-                return Err(wrong(why).with_help(&help));
+            let multiplexed = |how: &str| wrong(format!("`{path}` of signal `{name}` is multiplexed{how}"));
+            match signal.multiplex {
+                Multiplex::Where(value) if of_group != Some(value) => {
+                    let how = format!(": it is there only where the multiplexor is {value}");
+                    let help = format!("put it into a [[message]] of its own with `multiplex = {value}`");
+                    return Err(multiplexed(&how).with_help(help));
+                }
+                Multiplex::Nested => {
+                    let how = " by ranges or in two steps (SG_MUL_VAL_), which is not supported";
+                    return Err(multiplexed(how).with_help("choose a message that always has it"));
+                }
+                _ => {}
             }
             let which = replies.iter().position(|reply| reply == message).ok_or_else(unknown)?;
             let before =
@@ -409,50 +393,38 @@ impl Compiler<'_> {
         }
         let text_answer = frame.text.is_some();
         if text_answer && (s.has_place() || s.bits.is_some()) {
-            let why =
-                format!("signal `{name}` stands in a line of text: it has no register, byte, type or bits");
-            return Err(wrong(why));
+            let has = "stands in a line of text: it has no register, byte, type or bits";
+            return Err(wrong(format!("signal `{name}` {has}")));
         }
         if let Some(Form::Pattern(pattern)) = &frame.text {
-            let at = pattern
-                .fields()
-                .position(|(field, _)| field == name)
-                .ok_or_else(|| wrong(format!("signal `{name}` is not in the line of `{}`", frame.name)))?;
+            let missing = || wrong(format!("signal `{name}` is not in the line of `{}`", frame.name));
+            let at = pattern.fields().position(|(field, _)| field == name).ok_or_else(missing)?;
             let (number, order) = (NumberType::F64, ByteOrder::Abcd);
             return Ok(Place::Bytes(Field { at: 8 * at, number, order, bits: None }));
         }
         if let Some(address) = s.address {
             let number = s.number.ok_or_else(|| wrong(format!("signal `{name}` needs `type`")))?;
             let wanted = Span { address, count: number.bytes().div_ceil(2) as u16 };
-            let stands =
-                Self::within(&frame.spans, wanted).filter(|_| s.register.is_none() && s.byte.is_none());
-            let at = stands.ok_or_else(|| {
+            let alone = s.register.is_none() && s.byte.is_none();
+            let at = Self::within(&frame.spans, wanted).filter(|_| alone).ok_or_else(|| {
+                let help =
+                    "`address` is a register of a [[poll]], and takes the place of `register` and `byte`";
                 let why = format!("`address` {address} of signal `{name}` is not read by `{}`", frame.name);
-                wrong(why).with_help(
-                    "`address` is a register of a [[poll]], and takes the place of `register` and `byte`",
-                )
+                wrong(why).with_help(help)
             })?;
             return Ok(Place::Bytes(Field { at, number, order: s.byte_order, bits: s.bits }));
         }
-        if self
-            .description
-            .poll
-            .iter()
-            .any(|poll| *poll.name.as_ref() == frame.name && poll.address.is_none())
-        {
-            let why = format!(
-                "signal `{name}` needs `address`: poll `{}` names no registers of its own",
-                frame.name
-            );
+        let mut polls = self.description.poll.iter();
+        if let Some(poll) = polls.find(|poll| *poll.name.as_ref() == frame.name && poll.address.is_none()) {
+            let poll = poll.name.as_ref();
+            let why = format!("signal `{name}` needs `address`: poll `{poll}` names no registers of its own");
             return Err(wrong(why));
         }
         let at = match (s.register, s.byte) {
             (None, None) if text_answer => 0,
             (Some(register), None) => 2 * usize::from(register),
             (None, Some(byte)) => usize::from(byte),
-            _ => {
-                return Err(wrong(format!("signal `{name}` needs either `register` or `byte`")));
-            }
+            _ => return Err(wrong(format!("signal `{name}` needs either `register` or `byte`"))),
         };
         let number = if text_answer { Some(NumberType::F64) } else { s.number };
         let number = number.ok_or_else(|| wrong(format!("signal `{name}` needs `type`")))?;
@@ -470,8 +442,7 @@ impl Compiler<'_> {
         }
         let outside = |safe: f64| s.range.is_some_and(|(low, high)| safe < low || safe > high);
         if s.safe.is_some_and(outside) {
-            let message = format!("the safe value of set-point `{name}` lies outside its range");
-            return Err(wrong(message));
+            return Err(wrong(format!("the safe value of set-point `{name}` lies outside its range")));
         }
         if let Some(send) = &s.send {
             return Ok(CompiledSet { block: None, scale: s.scale, line: Some(self.sent_line(s, send)?) });
@@ -491,12 +462,11 @@ impl Compiler<'_> {
             Field { at: 2 * usize::from(s.register), number, order: s.byte_order, bits: None }
         };
         let number = field.number;
-        self.check_field(&field, 2 * usize::from(blocks[block].count), s.name.span(), name)?;
+        self.check_field(&field, 2 * usize::from(blocks[block].count), &s.name)?;
         if let Some((low, high)) = s.range {
             let (least, most) = (number.limits().0 * s.scale, number.limits().1 * s.scale);
             if low < least.min(most) || high > least.max(most) {
-                let message = format!("the range of set-point `{name}` is more than its type can hold");
-                return Err(wrong(message));
+                return Err(wrong(format!("the range of set-point `{name}` is more than its type can hold")));
             }
         }
         Ok(CompiledSet { block: Some((block, field)), scale: s.scale, line: None })
@@ -513,8 +483,10 @@ impl Compiler<'_> {
         s: &crate::schema::Set,
         send: &str,
     ) -> Result<(Pattern, Vec<Option<SetId>>), ProfileError> {
+        let name = s.name.as_ref();
+        let wrong = |why: String| self.at_name(&s.name, why);
         let pattern = self.pattern(send)?;
-        let own = |field: &str| field.is_empty() || field == s.name.as_ref();
+        let own = |field: &str| field.is_empty() || field == name;
         let owner = |(field, _): (&str, &_)| {
             if own(field) {
                 return Ok(None);
@@ -522,17 +494,12 @@ impl Compiler<'_> {
             let sets = &self.description.set;
             let other = sets.iter().position(|set| set.name.as_ref() == field && set.send.is_some());
             other.map(|other| Some(SetId(other))).ok_or_else(|| {
-                let why = format!(
-                    "`{{{field}}}` in the line of set-point `{}` is not a set-point of text",
-                    s.name.as_ref()
-                );
-                self.at_name(&s.name, why)
+                wrong(format!("`{{{field}}}` in the line of set-point `{name}` is not a set-point of text"))
             })
         };
         let owners = pattern.fields().map(owner).collect::<Result<Vec<_>, _>>()?;
         if !owners.is_empty() && !owners.contains(&None) {
-            let why = format!("the line of set-point `{}` has no `{{}}` for its own value", s.name.as_ref());
-            return Err(self.at_name(&s.name, why));
+            return Err(wrong(format!("the line of set-point `{name}` has no `{{}}` for its own value")));
         }
         Ok((pattern, owners))
     }
@@ -541,19 +508,19 @@ impl Compiler<'_> {
         &self,
         field: &Field,
         frame_bytes: usize,
-        span: Range<usize>,
-        name: &str,
+        named: &toml::Spanned<String>,
     ) -> Result<(), ProfileError> {
-        if field.end() > frame_bytes {
+        let (name, end) = (named.as_ref(), field.end());
+        if end > frame_bytes {
             return Err(
-                self.at(span, format!("`{name}` ends at byte {} of a frame of {frame_bytes}", field.end()))
+                self.at_name(named, format!("`{name}` ends at byte {end} of a frame of {frame_bytes}"))
             );
         }
         if let Some((first, width)) = field.bits {
             // a number has at most 4 bytes
             let most = 8 * field.number.bytes() as u32;
             if width == 0 || first >= most || width > most - first {
-                return Err(self.at(span, format!("the bits of `{name}` lie outside its {most} bits")));
+                return Err(self.at_name(named, format!("the bits of `{name}` lie outside its {most} bits")));
             }
         }
         Ok(())

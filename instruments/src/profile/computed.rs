@@ -33,11 +33,17 @@ pub(super) fn spread(signals: Vec<Signal>) -> Vec<Signal> {
 impl Profile {
     /// Works out the computed signals of a frame whose own numbers stand in `values`.
     pub(super) fn work_out(&self, frame: FrameId, values: &mut Values) {
-        for (index, signal) in self.signals.iter().enumerate().filter(|(_, s)| s.frame == frame) {
-            if let Place::Computed(value) = &signal.place {
-                values.0[index] = value.value(&values.0) * signal.scale + signal.offset;
-            }
+        for (index, value) in self.computed(frame) {
+            let signal = &self.signals[index];
+            values.0[index] = value.value(&values.0) * signal.scale + signal.offset;
         }
+    }
+
+    /// The computed signals of a frame, by their indices.
+    fn computed(&self, frame: FrameId) -> impl Iterator<Item = (usize, &Expression)> {
+        let signals = self.signals.iter().enumerate().filter(move |(_, signal)| signal.frame == frame);
+        signals
+            .filter_map(|(i, s)| if let Place::Computed(value) = &s.place { Some((i, value)) } else { None })
     }
 
     /// What one count of the most telling input changes, in SI units; NaN where a coefficient is not known yet.
@@ -77,16 +83,7 @@ impl Profile {
         unit_value: &mut dyn FnMut(SignalId) -> f64,
     ) -> Option<Vec<(SignalId, f64)>> {
         let inputs = self.inputs(frame);
-        let computed: Vec<(usize, &Expression)> = self
-            .signals
-            .iter()
-            .enumerate()
-            .filter(|(_, s)| s.frame == frame)
-            .filter_map(|(i, s)| match &s.place {
-                Place::Computed(value) => Some((i, value)),
-                _ => None,
-            })
-            .collect();
+        let computed: Vec<(usize, &Expression)> = self.computed(frame).collect();
         let n = inputs.len();
         if n == 0 || computed.len() != n {
             return None;

@@ -42,10 +42,20 @@ const COMMANDED: &[(Role, &[&str])] = &[
 const FASTEST_HZ: f64 = 20_000.0;
 
 impl Compiler<'_> {
+    /// Refuses what stands in a section.
+    fn refuse(&self, section: &str, why: impl ToString) -> Result<(), ProfileError> {
+        Err(self.at_text(section, why))
+    }
+
+    /// Refuses what has this name.
+    fn refuse_named(&self, name: &toml::Spanned<String>, why: impl ToString) -> Result<(), ProfileError> {
+        Err(self.at_name(name, why))
+    }
+
     pub(super) fn check_header(&self) -> Result<(), ProfileError> {
         let link = &self.description.link;
         let wrong = |why: String| self.at_text("[profile]", why);
-        let wrong_link = |why: &str| Err(self.at_text("[link]", why));
+        let wrong_link = |why: &str| self.refuse("[link]", why);
         if self.description.profile.schema != 1 {
             let why = format!("schema {} is not known", self.description.profile.schema);
             return Err(wrong(why).with_help("this version reads schema = 1"));
@@ -54,10 +64,8 @@ impl Compiler<'_> {
         if id.is_empty() || !id.chars().all(|c| c.is_ascii_alphanumeric() || "-_.".contains(c)) {
             return Err(wrong(format!("`{id}` is not an id: letters, digits, `-`, `_` and `.`")));
         }
-        let formed = |format: &String| {
-            let [data, parity, stop] = format.as_bytes() else { return false };
-            matches!(data, b'7' | b'8') && matches!(parity, b'N' | b'E' | b'O') && matches!(stop, b'1' | b'2')
-        };
+        let formed =
+            |format: &String| matches!(format.as_bytes(), [b'7' | b'8', b'N' | b'E' | b'O', b'1' | b'2']);
         if let Some(format) = link.format.as_ref().filter(|format| !formed(format)) {
             let problem = format!(
                 "`format`: `{format}` is none; data bits 7 or 8, parity N, E or O, stop bits 1 or 2, as 8N1"
@@ -67,9 +75,8 @@ impl Compiler<'_> {
         if link.baud == Some(0) || link.bitrate == Some(0) {
             return wrong_link("a line of no bits per second carries nothing");
         }
-        if matches!(link.kind, LinkKind::ModbusRtu | LinkKind::Serial)
-            && (link.baud.is_none() || link.format.is_none())
-        {
+        let serial = matches!(link.kind, LinkKind::ModbusRtu | LinkKind::Serial);
+        if serial && (link.baud.is_none() || link.format.is_none()) {
             return wrong_link("a serial link needs `baud` and `format`");
         }
         if self.description.vector.is_empty() {
@@ -107,77 +114,58 @@ impl Compiler<'_> {
         ];
         for (section, used, kinds) in rows {
             if used && !kinds.contains(&d.link.kind) {
-                return Err(
-                    self.at_text(section, format!("a link of kind {:?} has no {section}", d.link.kind))
-                );
+                return self.refuse(section, format!("a link of kind {:?} has no {section}", d.link.kind));
             }
         }
         let text = matches!(d.link.kind, Serial | Tcp | Scpi);
         let words = d.link.error_query.is_some() || d.link.choice.is_some() || !d.link.unsolicited.is_empty();
         if words && !text {
-            return Err(
-                self.at_text("[link]", "`error_query`, `choice` and `unsolicited` are for lines of text")
-            );
+            return self.refuse("[link]", "`error_query`, `choice` and `unsolicited` are for lines of text");
         }
         for (key, file, kind) in [("dbc", &d.link.dbc, Can), ("eds", &d.link.eds, Canopen)] {
-            if let Some(file) = file {
-                if d.link.kind != kind {
-                    return Err(self.at_text("[link]", format!("`{key}` is for a link of kind {kind:?}")));
-                }
-                if file.contains(['/', '\\']) {
-                    return Err(
-                        self.at_text("[link]", format!("`{key}`: the file must be beside the profile"))
-                    );
-                }
+            let Some(file) = file else { continue };
+            if d.link.kind != kind {
+                return self.refuse("[link]", format!("`{key}` is for a link of kind {kind:?}"));
+            }
+            if file.contains(['/', '\\']) {
+                return self.refuse("[link]", format!("`{key}`: the file must be beside the profile"));
             }
         }
-        for init in &d.init {
-            self.check_init(init)?;
-        }
+        d.init.iter().try_for_each(|init| self.check_init(init))?;
         self.check_udp()?;
-        for poll in &d.poll {
-            self.check_poll(poll)?;
-        }
+        d.poll.iter().try_for_each(|poll| self.check_poll(poll))?;
         self.check_blocks()?;
         self.check_stream()?;
         for alarm in &d.link.unsolicited {
             if self.pattern(alarm)?.head().is_empty() {
-                let problem = format!("the alarm `{alarm}` must begin with text of its own");
-                return Err(self.at_text("[link]", problem));
+                return self.refuse("[link]", format!("the alarm `{alarm}` must begin with text of its own"));
             }
         }
-        let rates = d
-            .message
-            .iter()
-            .map(|m| (&m.name, m.rate_hz))
-            .chain(d.query.iter().map(|q| (&q.name, q.rate_hz)));
-        for (name, rate) in rates {
+        let messages = d.message.iter().map(|message| (&message.name, message.rate_hz));
+        for (name, rate) in messages.chain(d.query.iter().map(|query| (&query.name, query.rate_hz))) {
             if !(rate > 0.0 && rate <= FASTEST_HZ) {
                 let problem = format!("`{}`: a `rate_hz` is above 0 and at most {FASTEST_HZ}", name.as_ref());
-                return Err(self.at_name(name, problem));
+                return self.refuse_named(name, problem);
             }
         }
         for query in &d.query {
-            let name = &query.send;
-            if d.link.kind == Sysfs && (name.is_empty() || name.starts_with('.') || name.contains(['/', ' ']))
+            let (name, send) = (query.name.as_ref(), &query.send);
+            if d.link.kind == Sysfs && (send.is_empty() || send.starts_with('.') || send.contains(['/', ' ']))
             {
-                let problem = format!("query `{}`: `{name}` is no name of an attribute", query.name.as_ref());
-                return Err(self.at_name(&query.name, problem));
+                let problem = format!("query `{name}`: `{send}` is no name of an attribute");
+                return self.refuse_named(&query.name, problem);
             }
             let forms = [query.length.is_some(), query.unit.is_some(), query.answer.is_some()];
             if forms.iter().filter(|x| **x).count() > 1 {
-                let problem =
-                    format!("query `{}` takes one of `length`, `unit` and `answer`", query.name.as_ref());
-                return Err(self.at_name(&query.name, problem));
+                let problem = format!("query `{name}` takes one of `length`, `unit` and `answer`");
+                return self.refuse_named(&query.name, problem);
             }
         }
         if let Some(set) = d.set.iter().find(|set| text != set.send.is_some()) {
-            let problem = if text {
-                "needs `send`: its link speaks in lines"
-            } else {
-                "has `send`, and no lines to send"
-            };
-            return Err(self.at_name(&set.name, format!("set-point `{}` {problem}", set.name.as_ref())));
+            let (lines, none) =
+                ("needs `send`: its link speaks in lines", "has `send`, and no lines to send");
+            let problem = format!("set-point `{}` {}", set.name.as_ref(), if text { lines } else { none });
+            return self.refuse_named(&set.name, problem);
         }
         self.check_roles()
     }
@@ -187,18 +175,18 @@ impl Compiler<'_> {
         let d = self.description;
         if d.link.kind != LinkKind::Udp {
             return match d.link.local_port {
-                Some(_) => Err(self.at_text("[link]", "`local_port` is for a link of kind Udp")),
+                Some(_) => self.refuse("[link]", "`local_port` is for a link of kind Udp"),
                 None => Ok(()),
             };
         }
-        let problem = if d.stream.is_none() {
-            "a link of kind Udp needs a [stream]"
-        } else if d.link.local_port.is_none() && d.init.is_empty() {
-            "a link of kind Udp needs `local_port`, or an [[init]] that tells the instrument where to send"
-        } else {
-            return Ok(());
-        };
-        Err(self.at_text("[link]", problem))
+        if d.stream.is_none() {
+            return self.refuse("[link]", "a link of kind Udp needs a [stream]");
+        }
+        if d.link.local_port.is_none() && d.init.is_empty() {
+            let problem = "a link of kind Udp needs `local_port`, or an [[init]] that tells the instrument where to send";
+            return self.refuse("[link]", problem);
+        }
+        Ok(())
     }
 
     /// Modbus RTU has no transaction number: an answer that comes late to one of two requests that
@@ -237,6 +225,7 @@ impl Compiler<'_> {
             ("registers", init.registers.is_some(), &[ModbusTcp, ModbusRtu]),
             ("sdo", init.sdo.is_some(), &[Canopen]),
         ];
+        let no_bytes = |hex: &str| from_hex(hex).is_none_or(|bytes| bytes.is_empty());
         let used: Vec<&(&str, bool, &[LinkKind])> = acts.iter().filter(|(_, used, _)| *used).collect();
         let kind = self.description.link.kind;
         let problem = match used.as_slice() {
@@ -247,13 +236,7 @@ impl Compiler<'_> {
                 Some(_) if !matches!(init.table, Table::Holding | Table::Coil) => {
                     "only holding registers and coils can be written".into()
                 }
-                _ if init
-                    .hex
-                    .as_deref()
-                    .is_some_and(|hex| from_hex(hex).is_none_or(|bytes| bytes.is_empty())) =>
-                {
-                    "`hex` is not bytes in hexadecimal".into()
-                }
+                _ if init.hex.as_deref().is_some_and(no_bytes) => "`hex` is not bytes in hexadecimal".into(),
                 _ if init.expect.is_some() && (init.send.is_none() || kind == Udp) => {
                     "only `send` has an answer to `expect`".into()
                 }
@@ -262,7 +245,7 @@ impl Compiler<'_> {
             [(act, ..)] => format!("a link of kind {kind:?} has no `{act}`"),
             _ => "does one thing: send, hex, can, function, copy, registers or sdo".to_string(),
         };
-        Err(self.at_text("[[init]]", format!("an [[init]]: {problem}")))
+        self.refuse("[[init]]", format!("an [[init]]: {problem}"))
     }
 
     fn check_roles(&self) -> Result<(), ProfileError> {
@@ -270,27 +253,24 @@ impl Compiler<'_> {
         let signal = |name: &str| d.signal.iter().any(|signal| signal.name.as_ref() == name);
         let set = |name: &str| d.set.iter().find(|set| set.name.as_ref() == name);
         if d.profile.roles.is_empty() {
-            return Err(self.at_text("[profile]", "`roles` is empty: say what the instrument can be"));
+            return self.refuse("[profile]", "`roles` is empty: say what the instrument can be");
         }
         for role in &d.profile.roles {
             let problem = |what: String| {
-                Err(self.at_text("[profile]", format!("an instrument of role {role:?} needs {what}")))
+                self.refuse("[profile]", format!("an instrument of role {role:?} needs {what}"))
             };
-            let row = NEEDS.iter().find(|(named, ..)| named == role);
-            let (signals, sets) = row.map_or((&[][..], &[][..]), |(_, signals, sets)| (*signals, *sets));
-            if let Some(missing) = signals.iter().find(|name| !signal(name)) {
-                return problem(format!("a signal `{missing}`"));
+            for (_, signals, sets) in NEEDS.iter().filter(|(named, ..)| named == role) {
+                if let Some(missing) = signals.iter().find(|name| !signal(name)) {
+                    return problem(format!("a signal `{missing}`"));
+                }
+                if let Some(missing) = sets.iter().find(|name| set(name).is_none()) {
+                    return problem(format!("a set-point `{missing}`"));
+                }
             }
-            if let Some(missing) = sets.iter().find(|name| set(name).is_none()) {
-                return problem(format!("a set-point `{missing}`"));
-            }
-            let unsafe_one = SAFE
-                .iter()
-                .find(|(named, name)| named == role && set(name).is_some_and(|s| s.safe.is_none()));
-            if let Some((_, name)) = unsafe_one {
-                return problem(format!(
-                    "a `safe` value of its set-point `{name}`: without it there is no 'off'"
-                ));
+            let not_safe = |name: &str| set(name).is_some_and(|set| set.safe.is_none());
+            if let Some((_, name)) = SAFE.iter().find(|(named, name)| named == role && not_safe(name)) {
+                let what = format!("a `safe` value of its set-point `{name}`: without it there is no 'off'");
+                return problem(what);
             }
             if matches!(role, Role::ForceLateral | Role::ForceNormal) && d.signal.is_empty() {
                 return problem("a signal".into());
@@ -303,13 +283,9 @@ impl Compiler<'_> {
     /// Only a heartbeat has a time that the instrument waits for the next one.
     fn check_heartbeat(&self) -> Result<(), ProfileError> {
         let wrong = |set: &&Set| set.timeout_ms.is_some_and(|ms| ms == 0 || set.name.as_ref() != "heartbeat");
-        match self.description.set.iter().find(wrong) {
-            None => Ok(()),
-            Some(set) => {
-                let problem = "`timeout_ms` is above zero, and belongs to the set-point `heartbeat`";
-                Err(self.at_name(&set.name, problem))
-            }
-        }
+        let problem = "`timeout_ms` is above zero, and belongs to the set-point `heartbeat`";
+        let wrong = self.description.set.iter().find(wrong);
+        wrong.map_or(Ok(()), |set| self.refuse_named(&set.name, problem))
     }
 
     /// Whether each set-point is one that the roles command.
@@ -317,37 +293,23 @@ impl Compiler<'_> {
         let d = self.description;
         let has = |role: &Role| d.profile.roles.contains(role);
         let of_roles = COMMANDED.iter().filter(|(role, _)| has(role)).flat_map(|(_, names)| names.iter());
-        let mut known: Vec<&str> = of_roles.copied().collect();
-        if d.link.kind == LinkKind::Canopen {
-            known.push("control");
-        }
-        match d.set.iter().find(|set| !known.contains(&set.name.as_ref().as_str())) {
-            None => Ok(()),
-            Some(set) => {
-                let names = known.join(", ");
-                let problem = format!(
-                    "nobody would send the set-point `{}`; its roles have: {names}",
-                    set.name.as_ref()
-                );
-                Err(self.at_name(&set.name, problem).with_help("what is done once goes into an [[init]]"))
-            }
-        }
+        let control = (d.link.kind == LinkKind::Canopen).then_some("control");
+        let known: Vec<&str> = of_roles.copied().chain(control).collect();
+        let unknown = d.set.iter().find(|set| !known.contains(&set.name.as_ref().as_str()));
+        let Some(Set { name, .. }) = unknown else { return Ok(()) };
+        let (set, names) = (name.as_ref(), known.join(", "));
+        let problem = format!("nobody would send the set-point `{set}`; its roles have: {names}");
+        Err(self.at_name(name, problem).with_help("what is done once goes into an [[init]]"))
     }
 
     pub(super) fn check_emulator(&self, index: &dyn Fn(&str) -> Option<usize>) -> Result<(), ProfileError> {
         let emulator = &self.description.emulator;
-        let wrong = |name: &str, what| {
-            self.at_text("[emulator", format!("[emulator] speaks of `{name}`, which is not a {what}"))
-        };
-        if let Some(name) =
-            emulator.measure.keys().chain(emulator.constant.keys()).find(|name| index(name).is_none())
-        {
-            return Err(wrong(name, "signal"));
-        }
-        let is_set = |name: &&String| self.description.set.iter().any(|set| set.name.as_ref() == *name);
-        if let Some(name) = emulator.command.keys().find(|name| !is_set(name)) {
-            return Err(wrong(name, "set-point"));
-        }
-        Ok(())
+        let is_set = |name: &String| self.description.set.iter().any(|set| set.name.as_ref() == name);
+        let mut shown = emulator.measure.keys().chain(emulator.constant.keys());
+        let signal = shown.find(|name| index(name).is_none()).map(|name| (name, "signal"));
+        let set = || emulator.command.keys().find(|name| !is_set(name)).map(|name| (name, "set-point"));
+        signal.or_else(set).map_or(Ok(()), |(name, what)| {
+            self.refuse("[emulator", format!("[emulator] speaks of `{name}`, which is not a {what}"))
+        })
     }
 }

@@ -22,6 +22,17 @@ pub enum Table {
 }
 
 impl Table {
+    /// The function code that reads it.
+    #[must_use]
+    pub const fn read_function(self) -> u8 {
+        match self {
+            Self::Coil => 1,
+            Self::Discrete => 2,
+            Self::Holding => 3,
+            Self::Input => 4,
+        }
+    }
+
     /// Whether its registers are single bits on the wire.
     #[must_use]
     pub const fn is_bits(self) -> bool {
@@ -81,7 +92,7 @@ pub struct Stream {
     /// each number by its signal's name. See [`crate::codec::pattern`].
     pub line: Option<String>,
     /// Frames in a row that make an alignment believed.
-    #[serde(default = "defaults::one_frame")]
+    #[serde(default = "one_frame")]
     pub believed_after: u32,
     /// The register write that starts it.
     pub start_register: Option<(u16, u16)>,
@@ -219,8 +230,6 @@ pub struct Write {
     pub rate_hz: Option<f64>,
 }
 
-mod defaults {
-    pub const fn one_frame() -> u32 {
-        1
-    }
+const fn one_frame() -> u32 {
+    1
 }

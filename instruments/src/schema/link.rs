@@ -2,6 +2,7 @@
 
 use schemars::JsonSchema;
 use serde::Deserialize;
+use std::time::Duration;
 
 /// Kinds of link.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Deserialize, JsonSchema)]
@@ -71,17 +72,39 @@ pub struct Link {
     /// Several units of one kind, of which the setup means one by its name: `{which}` in the questions is its number.
     pub choice: Option<Choice>,
     /// A connection must stand within this time, in ms.
-    #[serde(default = "defaults::connect_timeout_ms")]
+    #[serde(default = "connect_timeout_ms")]
     pub connect_timeout_ms: u32,
     /// An answer must be complete within this time, in ms; afterwards the connection is dropped.
-    #[serde(default = "defaults::response_timeout_ms")]
+    #[serde(default = "response_timeout_ms")]
     pub response_timeout_ms: u32,
     /// First pause before a new connection, in ms; it doubles up to `backoff_longest_ms`.
-    #[serde(default = "defaults::backoff_first_ms")]
+    #[serde(default = "backoff_first_ms")]
     pub backoff_first_ms: u32,
     /// Longest pause before a new connection, in ms.
-    #[serde(default = "defaults::backoff_longest_ms")]
+    #[serde(default = "backoff_longest_ms")]
     pub backoff_longest_ms: u32,
+}
+
+impl Link {
+    /// What ends a line that is sent.
+    pub fn tx_end(&self) -> &str {
+        self.tx_terminator.as_deref().unwrap_or("\n")
+    }
+
+    /// What ends a line that comes.
+    pub fn rx_end(&self) -> &str {
+        self.rx_terminator.as_deref().unwrap_or("\n")
+    }
+
+    /// Data bits, parity and stop bits of a serial line.
+    pub fn line_format(&self) -> &str {
+        self.format.as_deref().unwrap_or("8N1")
+    }
+
+    /// How long an answer may take.
+    pub fn patience(&self) -> Duration {
+        Duration::from_millis(self.response_timeout_ms.into())
+    }
 }
 
 /// The query for the name of each of several units.
@@ -104,17 +127,15 @@ pub struct ErrorQuery {
     pub ok: Vec<String>,
 }
 
-mod defaults {
-    pub const fn backoff_first_ms() -> u32 {
-        20
-    }
-    pub const fn backoff_longest_ms() -> u32 {
-        2000
-    }
-    pub const fn connect_timeout_ms() -> u32 {
-        1000
-    }
-    pub const fn response_timeout_ms() -> u32 {
-        100
-    }
+const fn backoff_first_ms() -> u32 {
+    20
+}
+const fn backoff_longest_ms() -> u32 {
+    2000
+}
+const fn connect_timeout_ms() -> u32 {
+    1000
+}
+const fn response_timeout_ms() -> u32 {
+    100
 }

@@ -37,7 +37,7 @@ pub struct Signal {
     /// First bit and width, where only a part of the number counts.
     pub bits: Option<(u32, u32)>,
     /// Counts times this are `unit`s.
-    #[serde(default = "defaults::one")]
+    #[serde(default = "one")]
     pub scale: f64,
     /// A scale that depends on other signals, such as `pow10(-decimals)`; multiplies `scale`.
     pub scale_expr: Option<String>,
@@ -116,7 +116,7 @@ pub struct Set {
     #[serde(default)]
     pub byte_order: ByteOrder,
     /// Counts times this are `unit`s.
-    #[serde(default = "defaults::one")]
+    #[serde(default = "one")]
     pub scale: f64,
     /// Unit of the scaled value.
     #[serde(default)]
@@ -137,8 +137,6 @@ pub struct Set {
     pub text: String,
 }
 
-mod defaults {
-    pub const fn one() -> f64 {
-        1.0
-    }
+const fn one() -> f64 {
+    1.0
 }

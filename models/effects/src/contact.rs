@@ -264,24 +264,18 @@ fn angles() -> &'static Angles {
     ANGLES.get_or_init(|| {
         let (first, last) = (SERIES_LOAD.powf(0.25), STEEP_LOAD.powf(0.25));
         let top = (1.0 - STEEP_LOAD).sqrt();
-        let low = (0..=ANGLE_NODES)
-            .map(|i| {
-                let t = first + (last - first) * i as f64 / ANGLE_NODES as f64;
-                let phi = angle_by_bisection(t.powi(4));
-                (phi, 4.0 * t.powi(3) * PI / (phi * phi.sin()))
-            })
-            .collect();
-        let high = (0..=ANGLE_NODES)
-            .map(|i| {
-                let t = top * i as f64 / ANGLE_NODES as f64;
-                if i == 0 {
-                    return (PI, -std::f64::consts::SQRT_2);
-                }
-                let phi = angle_by_bisection(1.0 - t * t);
-                (phi, -2.0 * t * PI / (phi * phi.sin()))
-            })
-            .collect();
-        Angles { low, high }
+        let low = |i: usize| {
+            let t = first + (last - first) * i as f64 / ANGLE_NODES as f64;
+            let phi = angle_by_bisection(t.powi(4));
+            (phi, 4.0 * t.powi(3) * PI / (phi * phi.sin()))
+        };
+        let high = |i: usize| {
+            let t = top * i as f64 / ANGLE_NODES as f64;
+            let phi = angle_by_bisection(1.0 - t * t);
+            if i == 0 { (PI, -std::f64::consts::SQRT_2) } else { (phi, -2.0 * t * PI / (phi * phi.sin())) }
+        };
+        let nodes = 0..=ANGLE_NODES;
+        Angles { low: nodes.clone().map(low).collect(), high: nodes.map(high).collect() }
     })
 }
 

@@ -210,18 +210,14 @@ impl Corrected {
                 Some(text) => Some(crate::at(crate::own(&s.name, text).map_err(ModelError::Table)?)),
             };
             let effect = effect.ok_or_else(|| ModelError::Effect(s.name.clone()))?;
-            let law = effect
-                .laws
-                .iter()
-                .position(|l| l.name == s.law)
-                .ok_or_else(|| ModelError::Law { effect: s.name.clone(), law: s.law.clone() })?;
+            let no_law = || ModelError::Law { effect: s.name.clone(), law: s.law.clone() };
+            let law = effect.laws.iter().position(|l| l.name == s.law).ok_or_else(no_law)?;
             let expected = effect.laws[law].parameters;
             let mut theta = Vec::with_capacity(expected.len());
             for (index, p) in expected.iter().map(|p| p.at_load(saved.design.reference_load_n)).enumerate() {
                 let given = s.parameters.get(index).filter(|g| g.name == p.name && g.unit == p.unit);
-                let value = given
-                    .ok_or_else(|| ModelError::Parameter { effect: s.name.clone(), index, expected: p.name })?
-                    .value;
+                let other = || ModelError::Parameter { effect: s.name.clone(), index, expected: p.name };
+                let value = given.ok_or_else(other)?.value;
                 let slack = 1e-9 * (p.upper - p.lower).abs().min(1.0);
                 if !(value >= p.lower - slack && value <= p.upper + slack) {
                     let (effect, name, lower, upper) = (s.name.clone(), p.name, p.lower, p.upper);

@@ -69,10 +69,8 @@ static OWN: RwLock<Vec<&'static Effect>> = RwLock::new(Vec::new());
 /// # Panics
 /// A number that nobody was given.
 pub fn at(number: usize) -> &'static Effect {
-    KNOWN
-        .get(number)
-        .copied()
-        .unwrap_or_else(|| OWN.read().unwrap_or_else(PoisonError::into_inner)[number - KNOWN.len()])
+    let own = || OWN.read().unwrap_or_else(PoisonError::into_inner)[number - KNOWN.len()];
+    KNOWN.get(number).copied().unwrap_or_else(own)
 }
 
 /// Reads a user's own effect; its number.
@@ -101,10 +99,8 @@ pub fn own(name: &str, text: &str) -> Result<usize, String> {
         text.lines().take_while(|line| line.starts_with('#')).find_map(of)
     };
     let place = stated("place:").unwrap_or_else(|| "contact".into());
-    let place = Location::ALL
-        .into_iter()
-        .find(|p| p.name() == place)
-        .ok_or_else(|| format!("place '{place}': contact, finger, plate or instrument is needed"))?;
+    let nowhere = || format!("place '{place}': contact, finger, plate or instrument is needed");
+    let place = Location::ALL.into_iter().find(|p| p.name() == place).ok_or_else(nowhere)?;
     let sd = stated("size_sd:")
         .map_or(Ok(1.0), |text| text.parse::<f64>().map_err(|_| text))
         .and_then(|sd| if sd > 0.0 && sd.is_finite() { Ok(sd) } else { Err(sd.to_string()) });

@@ -22,35 +22,17 @@ pub fn lateral_force(baseline: &Baseline, effects: &[Active<'_>], pass: &Conditi
     read(baseline.contact(pass, design), effects, None, pass, design)
 }
 
-/// The same with one input beside its value: by e-folds or in its own unit, as [`Input`] has it.
-pub fn lateral_force_with(
-    baseline: &Baseline,
-    effects: &[Active<'_>],
-    beside: (Input, f64),
-    pass: &Condition,
-    design: &Design,
-) -> f64 {
-    read(baseline.contact(pass, design), effects, Some(beside), pass, design)
-}
-
-/// The same within a per cent or so, for searches that only look for places to begin.
-pub fn rough_lateral_force(
-    baseline: &Baseline,
-    effects: &[Active<'_>],
-    pass: &Condition,
-    design: &Design,
-) -> f64 {
-    read(Contact { coarse: true, ..baseline.contact(pass, design) }, effects, None, pass, design)
-}
-
-fn read(
+/// The same from the contact that a baseline gives the pass, within a per cent or so where that is coarse;
+/// with one input beside its value where one is given: by e-folds or in its own unit, as [`Input`] has it.
+pub fn read(
     mut contact: Contact,
     effects: &[Active<'_>],
     beside: Option<(Input, f64)>,
     pass: &Condition,
     design: &Design,
 ) -> f64 {
-    let mut reading = SensorError { gain: 1.0, crosstalk: 0.0, offset_n: 0.0 };
+    const EXACT: SensorError = SensorError { gain: 1.0, crosstalk: 0.0, offset_n: 0.0 };
+    let mut reading = EXACT;
     for active in effects {
         (active.effect.change)(active.law, active.theta, pass, design, &mut contact);
         (active.effect.read)(active.law, active.theta, pass, design, &mut reading);
@@ -75,7 +57,7 @@ fn read(
         None => {}
     }
     let friction = pass.direction.sign() * mean_friction(&contact);
-    if reading == (SensorError { gain: 1.0, crosstalk: 0.0, offset_n: 0.0 }) {
+    if reading == EXACT {
         return friction;
     }
     reading.gain * friction + reading.crosstalk * contact.normal_force + reading.offset_n
@@ -105,8 +87,8 @@ mod tests {
         };
         let step = 1e-3;
         let slope = |input| {
-            let [low, high] =
-                [-step, step].map(|s| lateral_force_with(&baseline, &[], (input, s), &pass, &design));
+            let [low, high] = [-step, step]
+                .map(|s| read(baseline.contact(&pass, &design), &[], Some((input, s)), &pass, &design));
             (high - low) / (2.0 * step)
         };
         let friction = pass.direction.sign() * 0.5;

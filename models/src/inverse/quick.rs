@@ -138,23 +138,16 @@ pub fn quick(
         law.mu_relative(&condition).ok().filter(|mu| mu.is_finite())
     };
     let answer = |w: f64, mu_relative: f64, slope_per_m: f64, reach: Reach, evaluations: u32| {
-        Some(QuickAnswer {
-            amplitude: PeakToPeak::from_metres(w),
-            mu_relative,
-            slope_per_m,
-            reach,
-            evaluations,
-        })
+        let amplitude = PeakToPeak::from_metres(w);
+        Some(QuickAnswer { amplitude, mu_relative, slope_per_m, reach, evaluations })
     };
     if !(wanted.is_finite() && largest > 0.0) {
         return None;
     }
     if let Some((w, slope)) = law.amplitude_for(condition, wanted) {
-        return if w.metres() <= largest {
-            answer(w.metres(), wanted, slope, Reach::Within, 0)
-        } else {
-            answer(largest, at(largest)?, 0.0, Reach::TooLow, 1)
-        };
+        let within = w.metres() <= largest;
+        let beyond = || answer(largest, at(largest)?, 0.0, Reach::TooLow, 1);
+        return if within { answer(w.metres(), wanted, slope, Reach::Within, 0) } else { beyond() };
     }
     let target = log_log(wanted);
     let (slope, first) = last.map_or((-1.0, 0.0), |last| last.onwards(target));
@@ -185,14 +178,13 @@ pub fn quick(
     // Where the law has no answer: below one of two amplitudes, above the other.
     let mut beyond = false;
     while evaluations < MOST_EVALUATIONS && (mu - wanted).abs() > CLOSE {
-        let to = search.next(w, mu, largest);
+        let mut to = search.next(w, mu, largest);
         if search.is_narrow() {
             break;
         }
         if w == largest && mu > wanted {
             return answer(w, mu, search.per_m, Reach::TooLow, evaluations);
         }
-        let mut to = to;
         evaluations += 1;
         let mut found = at(to);
         while found.is_none() && evaluations < MOST_EVALUATIONS {

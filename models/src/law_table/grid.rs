@@ -69,9 +69,7 @@ impl Grid {
             if twice.is_some() {
                 return Err(format!("grid: '{name}' is given twice"));
             }
-            if nodes.len() < 2
-                || nodes.windows(2).any(|w| w[0].partial_cmp(&w[1]) != Some(std::cmp::Ordering::Less))
-            {
+            if nodes.len() < 2 || !nodes.windows(2).all(|w| w[0] < w[1]) {
                 return Err(format!("grid: '{name}' needs two or more values that rise"));
             }
             if let Some(value) = nodes.iter().find(|v| !variable.admits(**v)) {
@@ -85,10 +83,8 @@ impl Grid {
         }
         let size = sorted.iter().map(|a| a.1.len()).fold(1, usize::saturating_mul);
         if sorted.is_empty() || size > super::MOST_ROWS {
-            return Err(format!(
-                "grid: {size} nodes; one variable at least, and {} nodes at most",
-                super::MOST_ROWS
-            ));
+            let most = super::MOST_ROWS;
+            return Err(format!("grid: {size} nodes; one variable at least, and {most} nodes at most"));
         }
         Ok(Grid { axes: sorted })
     }
@@ -104,16 +100,12 @@ impl Grid {
 
     fn node(&self, index: usize) -> Vec<f64> {
         let mut rest = index;
-        let mut row: Vec<f64> = self
-            .axes
-            .iter()
-            .rev()
-            .map(|(_, nodes)| {
-                let value = nodes[rest % nodes.len()];
-                rest /= nodes.len();
-                value
-            })
-            .collect();
+        let value = |(_, nodes): &(&Variable, Vec<f64>)| {
+            let at = rest % nodes.len();
+            rest /= nodes.len();
+            nodes[at]
+        };
+        let mut row: Vec<f64> = self.axes.iter().rev().map(value).collect();
         row.reverse();
         row
     }
@@ -159,10 +151,8 @@ impl Grid {
         for (row, answer) in conditions.iter().zip(answers) {
             for ((name, [low, high]), value) in ANSWERS.iter().zip(answer) {
                 if !(value >= low && value <= high) {
-                    return Err(format!(
-                        "{name} is {value} at {}: {low} to {high} is needed",
-                        self.words(row)
-                    ));
+                    let place = self.words(row);
+                    return Err(format!("{name} is {value} at {place}: {low} to {high} is needed"));
                 }
             }
         }

@@ -190,10 +190,8 @@ impl Row<'_> {
     /// The pass of the row, or every cell of it that is at fault.
     fn pass(&self, found: &mut Readable) -> Option<Pass> {
         let faults = found.count();
-        let point = self.required("point");
-        let point =
-            point.and_then(|text| text.parse().map_err(|_| self.bad("point", text, "a whole number")));
-        let point = found.value(point);
+        let whole = |text: &str| text.parse().map_err(|_| self.bad("point", text, "a whole number"));
+        let point = found.value(self.required("point").and_then(whole));
         let mut condition = Condition::paper();
         for c in covariate::REQUIRED {
             match self.cell(c.name) {
@@ -317,12 +315,7 @@ fn cells(p: &Pass) -> Vec<String> {
     cells.extend([p.lateral_force_n, p.normal_force_sd_n, p.lateral_force_sd_n].map(text));
     cells.push(text(p.samples));
     cells.extend(covariate::OPTIONAL.iter().map(covariate));
-    cells.extend([
-        text(p.phase_shift_deg),
-        text(p.replicate),
-        p.run.clone().unwrap_or_default(),
-        text(p.session),
-    ]);
+    cells.extend([text(p.phase_shift_deg), text(p.replicate), text(p.run.as_ref()), text(p.session)]);
     cells
 }
 

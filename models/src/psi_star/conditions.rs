@@ -84,11 +84,8 @@ pub(super) fn single_passes<'a>(
     each.sort_by(f64::total_cmp);
     let beyond = each.len() / 20;
     let high = *each.get(each.len().checked_sub(1 + beyond)?)?;
-    Some((
-        u32::try_from(each.len()).unwrap_or(u32::MAX),
-        each[beyond],
-        Some(high).filter(|high| high.is_finite()),
-    ))
+    let count = u32::try_from(each.len()).unwrap_or(u32::MAX);
+    Some((count, each[beyond], Some(high).filter(|high| high.is_finite())))
 }
 
 #[cfg(test)]

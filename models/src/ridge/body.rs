@@ -52,12 +52,19 @@ pub(super) struct Shape {
     pub hy: Field,
 }
 
-/// Stress of the viscous arms, Pa.
+/// Stress of the elements, Pa.
 #[derive(Clone, Debug, Default)]
-pub(super) struct ArmStress {
+pub(super) struct Stress {
     pub mean: Field,
     pub difference: Field,
     pub shear: Field,
+}
+
+impl Stress {
+    pub(super) fn zeros(elements: usize) -> Self {
+        let [mean, difference, shear] = std::array::from_fn(|_| Field::zeros(elements));
+        Stress { mean, difference, shear }
+    }
 }
 
 /// Forces under way between an element row and the node rows beside it, N/m.
@@ -75,18 +82,9 @@ pub(super) struct ForceRows {
 
 impl ForceRows {
     fn new(nx: usize, stride: usize) -> Self {
-        let row = || Field::zeros(stride);
-        let owed = || Field::zeros(nx);
-        ForceRows {
-            left_x: row(),
-            left_y: row(),
-            right_x: row(),
-            right_y: row(),
-            owed3_x: owed(),
-            owed3_y: owed(),
-            owed4_x: owed(),
-            owed4_y: owed(),
-        }
+        let [left_x, left_y, right_x, right_y] = std::array::from_fn(|_| Field::zeros(stride));
+        let [owed3_x, owed3_y, owed4_x, owed4_y] = std::array::from_fn(|_| Field::zeros(nx));
+        ForceRows { left_x, left_y, right_x, right_y, owed3_x, owed3_y, owed4_x, owed4_y }
     }
 
     #[inline(always)]
@@ -135,15 +133,14 @@ pub struct Body {
     pub(super) inverse_mass: Field,
     pub(super) load_x: Field,
     pub(super) load_y: Field,
-    pub(super) mean: Field,
-    pub(super) difference: Field,
-    pub(super) shear: Field,
+    pub(super) stress: Stress,
     pub(super) hourglass_x: Field,
     pub(super) hourglass_y: Field,
     pub(super) hourglass_stiffness: Field,
     pub(super) length: Field,
     pub(super) shape: Shape,
-    pub(super) arm: ArmStress,
+    /// Of the viscous arms; empty without any.
+    pub(super) arm: Stress,
     pub(super) laws: Vec<RowLaw>,
     pub(super) rows: ForceRows,
     pub(super) work: Work,
@@ -186,25 +183,14 @@ impl Body {
                 let (r1, r2, r3, r4) = (at(i, j), at(i + 1, j), at(i + 1, j + 1), at(i, j + 1));
                 let (dx13, dy13, dx24, dy24) = (r1.0 - r3.0, r1.1 - r3.1, r2.0 - r4.0, r2.1 - r4.1);
                 let area = mesh.area_m2(i, j);
-                let of = [
-                    dx13,
-                    dy13,
-                    dx24,
-                    dy24,
-                    0.5 / area,
-                    r1.0 - r2.0 + r3.0 - r4.0,
-                    r1.1 - r2.1 + r3.1 - r4.1,
-                ];
+                let (hx, hy) = (r1.0 - r2.0 + r3.0 - r4.0, r1.1 - r2.1 + r3.1 - r4.1);
+                let of = [dx13, dy13, dx24, dy24, 0.5 / area, hx, hy];
                 shape.iter_mut().zip(of).for_each(|(field, value)| field.push(value));
                 // sum over corners of b_i b_i, b the gradient of the shape functions.
                 let gradients = (dx13 * dx13 + dy13 * dy13 + dx24 * dx24 + dy24 * dy24) / (2.0 * area * area);
                 // Over 16: the stored force is a quarter, a corner's share, of a rate four times too large.
-                hourglass_stiffness.push(
-                    HOURGLASS_COEFFICIENT / 16.0
-                        * (material.lambda_pa() + 2.0 * material.shear_modulus_pa())
-                        * area
-                        * gradients,
-                );
+                let confined = material.lambda_pa() + 2.0 * material.shear_modulus_pa();
+                hourglass_stiffness.push(HOURGLASS_COEFFICIENT / 16.0 * confined * area * gradients);
                 // The shorter side of a slim element: viscosity must not stiffen it.
                 length.push((1.0 / gradients).sqrt());
             }
@@ -214,15 +200,7 @@ impl Body {
         let mass = Field::from(&mesh.lumped_mass_kg_m()[..]);
         let inverse: Vec<f64> = mass.iter().map(|m| if *m > 0.0 { 1.0 / m } else { 0.0 }).collect();
         let viscous = mesh.row_material.iter().any(|m| m.arm().is_some());
-        let arm = if viscous {
-            ArmStress {
-                mean: Field::zeros(elements),
-                difference: Field::zeros(elements),
-                shear: Field::zeros(elements),
-            }
-        } else {
-            ArmStress::default()
-        };
+        let arm = if viscous { Stress::zeros(elements) } else { Stress::default() };
         Body {
             nx,
             ny,
@@ -237,9 +215,7 @@ impl Body {
             mass,
             load_x: Field::zeros(nodes),
             load_y: Field::zeros(nodes),
-            mean: Field::zeros(elements),
-            difference: Field::zeros(elements),
-            shear: Field::zeros(elements),
+            stress: Stress::zeros(elements),
             hourglass_x: Field::zeros(elements),
             hourglass_y: Field::zeros(elements),
             hourglass_stiffness: Field::from(&hourglass_stiffness[..]),
@@ -327,11 +303,10 @@ impl Body {
     /// Stress (xx, yy, xy) in Pa of element `(i, j)`, tension positive, without the bulk viscosity.
     pub fn stress_pa(&self, i: usize, j: usize) -> [f64; 3] {
         let e = j * self.nx + i;
-        let mut s = [self.mean[e], self.difference[e], self.shear[e]];
+        let of = |stress: &Stress| [stress.mean[e], stress.difference[e], stress.shear[e]];
+        let mut s = of(&self.stress);
         if self.viscous && self.stiffness_damping_s == 0.0 {
-            s[0] += self.arm.mean[e];
-            s[1] += self.arm.difference[e];
-            s[2] += self.arm.shear[e];
+            s.iter_mut().zip(of(&self.arm)).for_each(|(s, arm)| *s += arm);
         }
         [s[0] + s[1], s[0] - s[1], s[2]]
     }
@@ -339,9 +314,9 @@ impl Body {
     /// Sets the stress (xx, yy, xy) in Pa of element `(i, j)`.
     pub fn set_stress(&mut self, i: usize, j: usize, stress: [f64; 3]) {
         let e = j * self.nx + i;
-        self.mean[e] = 0.5 * (stress[0] + stress[1]);
-        self.difference[e] = 0.5 * (stress[0] - stress[1]);
-        self.shear[e] = stress[2];
+        self.stress.mean[e] = 0.5 * (stress[0] + stress[1]);
+        self.stress.difference[e] = 0.5 * (stress[0] - stress[1]);
+        self.stress.shear[e] = stress[2];
     }
 
     /// Work counted so far (see [`Body::count_energy`]).
@@ -353,10 +328,7 @@ impl Body {
     pub fn energy(&self) -> Energy {
         let mut energy = Energy::default();
         for j in 0..=self.ny {
-            for i in 0..=self.nx {
-                if self.periodic && i == self.nx {
-                    continue;
-                }
+            for i in 0..self.own_columns() {
                 let n = self.node(i, j);
                 energy.kinetic += 0.5 * self.mass[n] * (self.vx[n].powi(2) + self.vy[n].powi(2));
             }
@@ -365,11 +337,9 @@ impl Body {
             let law = self.laws[j];
             for i in 0..self.nx {
                 let e = j * self.nx + i;
-                let area = 0.5 / self.shape.half_over_area[e];
-                energy.elastic += 0.5
-                    * area
-                    * (self.mean[e].powi(2) / law.bulk
-                        + (self.difference[e].powi(2) + self.shear[e].powi(2)) / law.shear);
+                let (area, s) = (0.5 / self.shape.half_over_area[e], &self.stress);
+                let deviator = (s.difference[e].powi(2) + s.shear[e].powi(2)) / law.shear;
+                energy.elastic += 0.5 * area * (s.mean[e].powi(2) / law.bulk + deviator);
                 energy.hourglass += 0.5 * (self.hourglass_x[e].powi(2) + self.hourglass_y[e].powi(2))
                     / self.hourglass_stiffness[e];
             }
@@ -380,7 +350,7 @@ impl Body {
     /// Bytes of this body on the heap, near enough.
     pub fn memory_bytes(&self) -> usize {
         let nodes = 2 * self.mesh.x_m.len() + 9 * self.x.len();
-        let elements = (7 + 7 + if self.viscous { 3 } else { 0 }) * self.mean.len();
+        let elements = (7 + 7 + if self.viscous { 3 } else { 0 }) * self.length.len();
         8 * (nodes + elements + 8 * self.stride)
     }
 
@@ -400,9 +370,7 @@ impl Body {
         }
         self.stiffness_damping_s = beta_s;
         self.viscous = true;
-        for field in [&mut self.arm.mean, &mut self.arm.difference, &mut self.arm.shear] {
-            *field = Field::zeros(self.mean.len());
-        }
+        self.arm = Stress::zeros(self.length.len());
     }
 
     /// Stiffness-proportional damping in s.
@@ -439,19 +407,22 @@ impl Body {
 
     /// Refuses a body that has run away.
     pub fn is_finite(&self) -> Result<(), RidgeError> {
-        let all = |values: &[f64]| values.iter().all(|v| v.is_finite() && v.abs() < 1e6);
-        if all(&self.vx) && all(&self.vy) {
-            return Ok(());
-        }
-        Err(RidgeError::Diverged)
+        let mut speeds = self.vx.iter().chain(self.vy.iter());
+        let sound = speeds.all(|v| v.is_finite() && v.abs() < 1e6);
+        if sound { Ok(()) } else { Err(RidgeError::Diverged) }
+    }
+
+    /// Columns of nodes of their own: the closing one of a periodic row is its twin's.
+    #[inline(always)]
+    fn own_columns(&self) -> usize {
+        self.nx + usize::from(!self.periodic)
     }
 
     /// Adds the part of the surface row's force that waits in the row `right` to the row `left`, so that
     /// a contact sees and changes one force a node.
     #[inline(always)]
     pub(super) fn complete_surface_force(&mut self) {
-        let last = if self.periodic { self.nx } else { self.nx + 1 };
-        for i in 0..last {
+        for i in 0..self.own_columns() {
             self.rows.left_x[i] += self.rows.right_x[i];
             self.rows.left_y[i] += self.rows.right_y[i];
             self.rows.right_x[i] = 0.0;

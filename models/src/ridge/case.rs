@@ -172,10 +172,7 @@ impl RidgeCase {
     /// Refuses what makes no sense, naming the value.
     pub fn check(&self) -> Result<(), RidgeError> {
         let within = |what: &str, value: f64, low: f64, high: f64| {
-            if value >= low && value <= high {
-                return Ok(());
-            }
-            Err(RidgeError::input(what, value, format!("{low} to {high}")))
+            RidgeError::unless(value >= low && value <= high, what, value, format!("{low} to {high}"))
         };
         within("amplitude_pp_m", self.amplitude.metres(), 0.0, 50e-6)?;
         within("frequency_hz", self.frequency_hz, 1e3, 1e6)?;

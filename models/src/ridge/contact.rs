@@ -46,9 +46,7 @@ pub struct Plate {
 impl Plate {
     /// `penalty`: spring of each surface node, N/m per metre of depth (zero: the node never touches).
     pub fn new(penalty: Vec<f64>, rule: FrictionRule, mu0: f64) -> Result<Plate, RidgeError> {
-        if !(0.0..=10.0).contains(&mu0) {
-            return Err(RidgeError::input("coefficient of friction", mu0, "0 to 10"));
-        }
+        RidgeError::unless((0.0..=10.0).contains(&mu0), "coefficient of friction", mu0, "0 to 10")?;
         if let Some(bad) = penalty.iter().find(|k| !(**k >= 0.0 && k.is_finite())) {
             return Err(RidgeError::input("contact penalty in Pa", *bad, "0 or above"));
         }
@@ -59,20 +57,18 @@ impl Plate {
 
     /// The same with springs along the plate that are softer than those across it by `ratio`, above 0 and up to 1.
     pub fn softer_along(self, ratio: f64) -> Result<Plate, RidgeError> {
-        if ratio > 0.0 && ratio <= 1.0 {
-            let along = self.penalty.iter().map(|k| k * ratio).collect();
-            return Ok(Plate { along, ..self });
-        }
-        Err(RidgeError::input("tangential penalty ratio", ratio, "above 0, up to 1"))
+        let possible = ratio > 0.0 && ratio <= 1.0;
+        RidgeError::unless(possible, "tangential penalty ratio", ratio, "above 0, up to 1")?;
+        let along = self.penalty.iter().map(|k| k * ratio).collect();
+        Ok(Plate { along, ..self })
     }
 
     /// The same with a layer on the plate, in series with the springs along it: of shear traction over slip `pa_per_m` (Pa/m, above 0),
     /// at nodes that stand for `width_m` each. Unlike a node's spring it is the same contact on every mesh.
     pub fn layered(self, pa_per_m: f64, width_m: &[f64]) -> Result<Plate, RidgeError> {
-        if !(pa_per_m > 0.0 && pa_per_m.is_finite()) || width_m.len() < self.along.len() {
-            let range = "above 0 and finite, with a width for each node";
-            return Err(RidgeError::input("tangential stiffness in Pa/m", pa_per_m, range));
-        }
+        let possible = pa_per_m > 0.0 && pa_per_m.is_finite() && width_m.len() >= self.along.len();
+        let range = "above 0 and finite, with a width for each node";
+        RidgeError::unless(possible, "tangential stiffness in Pa/m", pa_per_m, range)?;
         let series =
             |(k, w): (&f64, &f64)| if *k > 0.0 { 1.0 / (1.0 / k + 1.0 / (pa_per_m * w)) } else { 0.0 };
         let along = self.along.iter().zip(width_m).map(series).collect();

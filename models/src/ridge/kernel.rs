@@ -15,7 +15,7 @@
 //! No colouring and no scatter: forces on the nodes of row j are complete once the element rows j-1 and j
 //! are done; what row j owes to node row j+1 waits in four short rows that stay in the first-level cache.
 
-use super::body::{Body, RowLaw};
+use super::body::{Body, RowLaw, Stress};
 use super::lanes::Lanes;
 use pulp::{Simd, WithSimd};
 
@@ -190,6 +190,11 @@ fn vectors_mut<S: Simd>(values: &mut [f64], start: usize, count: usize) -> &mut 
     &mut S::as_mut_simd_f64s(&mut values[start..start + count]).0[..count / S::F64_LANES]
 }
 
+#[inline(always)]
+fn stresses<S: Simd>(of: &mut Stress, start: usize, count: usize) -> [&mut [S::f64s]; 3] {
+    [&mut of.mean, &mut of.difference, &mut of.shear].map(|field| vectors_mut::<S>(field, start, count))
+}
+
 /// Stress update of element row `j`; forces go to the rows `left` (corner 1), `right` (corner 2, one place
 /// further), and `owed` (corners 3 and 4).
 #[inline(always)]
@@ -219,21 +224,11 @@ fn element_row<S: Simd, const OBJECTIVE: bool, const VISCOUS: bool>(
     };
     let length = vectors::<S>(&body.length, el, nx);
     let hourglass = vectors::<S>(&body.hourglass_stiffness, el, nx);
-    let mean = vectors_mut::<S>(&mut body.mean, el, nx);
-    let difference = vectors_mut::<S>(&mut body.difference, el, nx);
-    let shear = vectors_mut::<S>(&mut body.shear, el, nx);
+    let [mean, difference, shear] = stresses::<S>(&mut body.stress, el, nx);
     let hourglass_x = vectors_mut::<S>(&mut body.hourglass_x, el, nx);
     let hourglass_y = vectors_mut::<S>(&mut body.hourglass_y, el, nx);
-    let arm = &mut body.arm;
-    let (arm_mean, arm_difference, arm_shear) = if VISCOUS {
-        (
-            vectors_mut::<S>(&mut arm.mean, el, nx),
-            vectors_mut::<S>(&mut arm.difference, el, nx),
-            vectors_mut::<S>(&mut arm.shear, el, nx),
-        )
-    } else {
-        (&mut [][..], &mut [][..], &mut [][..])
-    };
+    let [arm_mean, arm_difference, arm_shear] =
+        if VISCOUS { stresses::<S>(&mut body.arm, el, nx) } else { Default::default() };
     let rows = &mut body.rows;
     let left_x = vectors_mut::<S>(&mut rows.left_x, 0, nx);
     let left_y = vectors_mut::<S>(&mut rows.left_y, 0, nx);

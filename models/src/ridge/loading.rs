@@ -142,8 +142,7 @@ struct Rig {
 impl Rig {
     fn new(case: &RidgeCase, settings: &RunSettings) -> Result<(Rig, usize), RidgeError> {
         case.check()?;
-        let [corneum, dermis, soft] = case.materials();
-        let built = case.geometry.mesh(corneum, dermis, soft, case.elements)?;
+        let built = case.geometry.mesh(case.materials(), case.elements)?;
         let plate = case.plate(&built)?;
         let mesh = built.mesh;
         let surface = mesh.tributary_width_m(0);
@@ -300,9 +299,8 @@ pub fn run_watched(
 
     let amplitude = case.amplitude.sine_amplitude_m();
     let mut history = Vec::new();
-    if !(1.0..=10.0).contains(&settings.overshoot) {
-        return Err(RidgeError::input("overshoot", settings.overshoot, "1 to 10"));
-    }
+    let over = settings.overshoot;
+    RidgeError::unless((1.0..=10.0).contains(&over), "overshoot", over, "1 to 10")?;
     let first = amplitude * settings.overshoot;
     for ramp in 0..RAMP_CYCLES {
         let share = |k: usize| first * k as f64 / RAMP_CYCLES as f64;

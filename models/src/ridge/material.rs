@@ -38,22 +38,15 @@ impl Material {
 
     /// Refuses what no material can be, naming the value.
     pub fn check(&self, what: &str) -> Result<(), RidgeError> {
-        let refuse = |name: &str, value: f64, range: &str| {
-            Err(RidgeError::input(format!("{name} of the {what}"), value, range))
+        let unless = |ok: bool, name: &str, value: f64, range: &str| {
+            RidgeError::unless(ok, format!("{name} of the {what}"), value, range)
         };
-        if !(self.young_modulus_pa > 0.0 && self.young_modulus_pa < 1e12) {
-            return refuse("Young's modulus in Pa", self.young_modulus_pa, "above 0 and below 1e12");
-        }
-        if !(self.poisson_ratio >= 0.0 && self.poisson_ratio <= 0.49) {
-            return refuse("Poisson's ratio", self.poisson_ratio, "0 to 0.49");
-        }
-        if !(self.density_kg_m3 > 0.0 && self.density_kg_m3 < 1e5) {
-            return refuse("density in kg/m3", self.density_kg_m3, "above 0 and below 1e5");
-        }
-        if !(self.retardation_time_s >= 0.0 && self.retardation_time_s.is_finite()) {
-            return refuse("retardation time in s", self.retardation_time_s, "0 (elastic) or above");
-        }
-        Ok(())
+        let (modulus, nu) = (self.young_modulus_pa, self.poisson_ratio);
+        unless(modulus > 0.0 && modulus < 1e12, "Young's modulus in Pa", modulus, "above 0 and below 1e12")?;
+        unless((0.0..=0.49).contains(&nu), "Poisson's ratio", nu, "0 to 0.49")?;
+        let (density, time) = (self.density_kg_m3, self.retardation_time_s);
+        unless(density > 0.0 && density < 1e5, "density in kg/m3", density, "above 0 and below 1e5")?;
+        unless(time >= 0.0 && time.is_finite(), "retardation time in s", time, "0 (elastic) or above")
     }
 
     /// Lamé's first parameter in Pa (relaxed).

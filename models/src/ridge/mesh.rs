@@ -60,15 +60,10 @@ impl Mesh {
         place: impl Fn(usize, usize) -> (f64, f64),
     ) -> Result<Mesh, RidgeError> {
         let ny = row_material.len();
-        if nx == 0 || !nx.is_multiple_of(8) {
-            return Err(RidgeError::input("number of columns", nx as f64, "a multiple of 8, above 0"));
-        }
-        if ny == 0 {
-            return Err(RidgeError::input("number of rows", 0.0, "above 0"));
-        }
-        for material in &row_material {
-            material.check("layer")?;
-        }
+        let whole = nx > 0 && nx.is_multiple_of(8);
+        RidgeError::unless(whole, "number of columns", nx as f64, "a multiple of 8, above 0")?;
+        RidgeError::unless(ny > 0, "number of rows", 0.0, "above 0")?;
+        row_material.iter().try_for_each(|material| material.check("layer"))?;
         let stride = nx + PAD;
         let mut mesh = Mesh {
             nx,
@@ -152,11 +147,8 @@ impl Mesh {
             for i in 0..self.nx {
                 let area = self.area_m2(i, j);
                 if !(area > 0.0 && area.is_finite()) {
-                    return Err(RidgeError::input(
-                        format!("area in m2 of the element in column {i}, row {j}"),
-                        area,
-                        "above 0: the mesh is folded",
-                    ));
+                    let what = format!("area in m2 of the element in column {i}, row {j}");
+                    return Err(RidgeError::input(what, area, "above 0: the mesh is folded"));
                 }
             }
         }
@@ -219,23 +211,16 @@ impl RidgeGeometry {
     /// Returns the mesh and the row at which the dermis begins.
     pub fn mesh(
         &self,
-        corneum: Material,
-        dermis: Material,
-        subcutaneous: Material,
+        [corneum, dermis, subcutaneous]: [Material; 3],
         elements: usize,
     ) -> Result<RidgeMesh, RidgeError> {
-        for (what, value) in [
-            ("ridge width in m", self.ridge_width_m),
-            ("ridge height in m", self.ridge_height_m),
-            ("inner corneum thickness in m", self.inner_corneum_m),
-            ("dermis thickness in m", self.dermis_m),
-            ("subcutaneous thickness in m", self.subcutaneous_m),
-        ] {
-            positive(what, value)?;
-        }
-        if !(128..=200_000).contains(&elements) {
-            return Err(RidgeError::input("number of elements", elements as f64, "128 to 200000"));
-        }
+        positive("ridge width in m", self.ridge_width_m)?;
+        positive("ridge height in m", self.ridge_height_m)?;
+        positive("inner corneum thickness in m", self.inner_corneum_m)?;
+        positive("dermis thickness in m", self.dermis_m)?;
+        positive("subcutaneous thickness in m", self.subcutaneous_m)?;
+        let able = (128..=200_000).contains(&elements);
+        RidgeError::unless(able, "number of elements", elements as f64, "128 to 200000")?;
         // Half the rows in the stratum corneum, a quarter in each softer layer.
         let nx = (((elements as f64).sqrt() / 8.0).round() as usize).max(1) * 8;
         let ny = (elements as f64 / nx as f64).round() as usize;
@@ -254,10 +239,8 @@ impl RidgeGeometry {
         row_material.extend(std::iter::repeat_n(subcutaneous, soft_rows));
         let geometry = *self;
         let mesh = Mesh::from_nodes(nx, row_material, true, |i, j| {
-            let x = match i.cmp(&(nx / 2)) {
-                std::cmp::Ordering::Less => -half_columns[nx / 2 - i],
-                _ => half_columns[i - nx / 2],
-            };
+            let side = half_columns[i.abs_diff(nx / 2)];
+            let x = if i < nx / 2 { -side } else { side };
             let y = if j <= corneum_rows {
                 // Fine rows at the tip, equal ones at the valley, where the layer is thinner.
                 let side = (2.0 * x / geometry.ridge_width_m).abs();
@@ -313,8 +296,5 @@ fn graded(length: f64, first: f64, n: usize) -> Vec<f64> {
 }
 
 fn positive(what: &str, value: f64) -> Result<(), RidgeError> {
-    if value > 0.0 && value.is_finite() {
-        return Ok(());
-    }
-    Err(RidgeError::input(what, value, "above 0 and finite"))
+    RidgeError::unless(value > 0.0 && value.is_finite(), what, value, "above 0 and finite")
 }

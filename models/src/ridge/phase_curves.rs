@@ -68,14 +68,10 @@ impl SkinGrid {
     }
 
     fn skins(&self) -> impl Iterator<Item = Skin> + '_ {
-        self.moduli_pa.iter().flat_map(move |e| {
-            self.penalty_ratios.iter().flat_map(move |k| {
-                self.retardation_times_s.iter().map(move |tau| Skin {
-                    young_modulus_pa: *e,
-                    penalty_ratio: *k,
-                    retardation_time_s: *tau,
-                })
-            })
+        let pairs = self.moduli_pa.iter().flat_map(|e| self.penalty_ratios.iter().map(move |k| (*e, *k)));
+        pairs.flat_map(|(young_modulus_pa, penalty_ratio)| {
+            let times = self.retardation_times_s.iter();
+            times.map(move |tau| Skin { young_modulus_pa, penalty_ratio, retardation_time_s: *tau })
         })
     }
 

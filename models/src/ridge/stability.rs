@@ -4,7 +4,7 @@
 //! and damping ratio xi. omega comes from power iteration with the kernel itself as the operator, so the
 //! hourglass control, the layers and the penalty springs are all in it.
 
-use super::body::{Body, LINEAR_BULK_VISCOSITY};
+use super::body::{Body, LINEAR_BULK_VISCOSITY, Stress};
 use super::kernel::{self, Features, Step, Surface};
 use super::{Mesh, Strain};
 
@@ -25,9 +25,6 @@ const MOST_STEPS_IN_ONE: usize = 32;
 pub fn highest_frequency_rad_s(body: &Body, penalty: &[f64]) -> f64 {
     let mut probe = body.clone();
     probe.move_in_longer_steps(&[]);
-    for field in [&mut probe.mean, &mut probe.difference, &mut probe.shear] {
-        field.fill(0.0);
-    }
     probe.load_x.fill(0.0);
     probe.load_y.fill(0.0);
     for (law, material) in probe.laws.iter_mut().zip(&body.mesh().row_material) {
@@ -44,10 +41,10 @@ pub fn highest_frequency_rad_s(body: &Body, penalty: &[f64]) -> f64 {
         seed = seed.wrapping_mul(6_364_136_223_846_793_005).wrapping_add(1_442_695_040_888_963_407);
         (seed >> 11) as f64 / (1_u64 << 53) as f64 - 0.5
     };
-    let mut u: Vec<f64> =
-        (0..nodes).map(|n| if probe.inverse_mass[n] > 0.0 { rough() } else { 0.0 }).collect();
-    let mut w: Vec<f64> =
-        (0..nodes).map(|n| if probe.inverse_mass[n] > 0.0 { rough() } else { 0.0 }).collect();
+    let mut start = || -> Vec<f64> {
+        probe.inverse_mass.iter().map(|inverse| if *inverse > 0.0 { rough() } else { 0.0 }).collect()
+    };
+    let (mut u, mut w) = (start(), start());
     if probe.periodic {
         for j in 0..=probe.ny {
             let first = j * probe.stride;
@@ -59,17 +56,9 @@ pub fn highest_frequency_rad_s(body: &Body, penalty: &[f64]) -> f64 {
     let mut square = 0.0;
     for _ in 0..ITERATIONS {
         let norm: f64 = (0..nodes).map(|n| probe.mass[n] * (u[n] * u[n] + w[n] * w[n])).sum::<f64>().sqrt();
-        for n in 0..nodes {
-            u[n] /= norm;
-            w[n] /= norm;
-        }
-        for field in [
-            &mut probe.mean,
-            &mut probe.difference,
-            &mut probe.shear,
-            &mut probe.hourglass_x,
-            &mut probe.hourglass_y,
-        ] {
+        u.iter_mut().chain(&mut w).for_each(|v| *v /= norm);
+        let Stress { mean, difference, shear } = &mut probe.stress;
+        for field in [mean, difference, shear, &mut probe.hourglass_x, &mut probe.hourglass_y] {
             field.fill(0.0);
         }
         probe.vx.copy_from_slice(&u);

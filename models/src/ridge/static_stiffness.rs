@@ -71,8 +71,7 @@ pub struct StaticStiffness {
 /// A case that makes no sense.
 pub fn of_case(case: &RidgeCase, line_load_n_m: f64, held: HeldAt) -> Result<StaticStiffness, RidgeError> {
     case.check()?;
-    let [corneum, dermis, soft] = case.materials();
-    let built = case.geometry.mesh(corneum, dermis, soft, case.elements)?;
+    let built = case.geometry.mesh(case.materials(), case.elements)?;
     let plate = case.plate(&built)?;
     let springs = Springs { across: plate.penalty().to_vec(), along: plate.along().to_vec() };
     let soft_rows = (built.mesh.ny - built.corneum_rows) / 2;
@@ -94,13 +93,9 @@ pub fn of_mesh(
     springs: &Springs,
     line_load_n_m: f64,
 ) -> Result<StaticStiffness, RidgeError> {
-    if !(line_load_n_m > 0.0 && line_load_n_m.is_finite()) || held == 0 || held > mesh.ny {
-        return Err(RidgeError::input(
-            "line load in N/m",
-            line_load_n_m,
-            "above 0, with a held row above the surface",
-        ));
-    }
+    let possible = line_load_n_m > 0.0 && line_load_n_m.is_finite() && held > 0 && held <= mesh.ny;
+    let range = "above 0, with a held row above the surface";
+    RidgeError::unless(possible, "line load in N/m", line_load_n_m, range)?;
     let compliance = surface_compliance(mesh, held)?;
     let columns = compliance.len() / 2;
     let lowest = mesh.y_m[..columns].iter().copied().fold(f64::INFINITY, f64::min);
@@ -199,9 +194,6 @@ fn press(
         touching.extend(more);
         touching.sort_unstable();
     }
-    Err(RidgeError::input(
-        "rounds of the contact search",
-        10.0 * gap.len() as f64,
-        "fewer: the contact does not settle",
-    ))
+    let rounds = 10.0 * gap.len() as f64;
+    Err(RidgeError::input("rounds of the contact search", rounds, "fewer: the contact does not settle"))
 }

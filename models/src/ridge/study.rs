@@ -114,17 +114,10 @@ pub fn fig_9(base: RidgeCase) -> Vec<StudyPoint> {
 
 /// The same on another ladder of amplitudes, peak-to-peak in m.
 pub fn fig_9_at(base: RidgeCase, amplitudes_pp_m: &[f64]) -> Vec<StudyPoint> {
-    let mut points = Vec::new();
-    for panel in Panel::ALL {
-        for value in panel.values() {
-            for amplitude in amplitudes_pp_m {
-                points.push(StudyPoint {
-                    panel,
-                    value,
-                    case: panel.set(base, value).with_amplitude_pp_m(*amplitude),
-                });
-            }
-        }
-    }
-    points
+    let curves = Panel::ALL.into_iter().flat_map(|panel| panel.values().map(|value| (panel, value)));
+    let of = |(panel, value): (Panel, f64)| {
+        let case = panel.set(base, value);
+        amplitudes_pp_m.iter().map(move |w| StudyPoint { panel, value, case: case.with_amplitude_pp_m(*w) })
+    };
+    curves.flat_map(of).collect()
 }

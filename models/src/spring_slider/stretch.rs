@@ -8,15 +8,16 @@ use crate::root;
 use std::f64::consts::PI;
 
 /// The driven stretch: `g(phi) = cos(phi) + offset` while touching.
-#[derive(Clone, Copy, Debug)]
+#[derive(Clone, Copy, Debug, PartialEq)]
 pub(super) struct Stretch {
+    /// Of the reaction force in units of `k_n a`: `-cos(alpha)`, or `h/a` in full contact.
     pub offset: f64,
     /// Half contact angle; pi where contact is never lost.
     pub alpha: f64,
     pub always_touching: bool,
     /// Growth per radian while sticking.
     pub kappa: f64,
-    /// Largest fall per radian, possibly infinite.
+    /// Largest fall per radian; infinite for instant recovery.
     pub rho: f64,
 }
 
@@ -28,14 +29,6 @@ pub(super) struct Turn {
     /// Stretch at the next touch-down.
     pub left_over: f64,
     /// Phase where the last stick of the turn ended in slip.
-    pub slip_onset: Option<f64>,
-}
-
-/// The periodic steady state.
-#[derive(Clone, Copy, Debug)]
-pub(super) struct Steady {
-    pub mean_force: f64,
-    pub at_touch_down: f64,
     pub slip_onset: Option<f64>,
 }
 
@@ -66,19 +59,15 @@ impl Stretch {
         to.sin() - from.sin() + self.offset * (to - from)
     }
 
-    pub(super) fn steady(&self) -> Steady {
-        let from = |turn: Turn, at_touch_down| Steady {
-            mean_force: turn.mean_force,
-            at_touch_down,
-            slip_onset: turn.slip_onset,
-        };
+    /// The periodic steady state: the stretch at touch-down, and the turn from there.
+    pub(super) fn steady(&self) -> (f64, Turn) {
         // Instant recovery forgets everything at separation. In full contact the stretch can be no less than the
         // smallest limit, which is where the turn starts: exact for instant recovery, even infinitely slow.
         let mut x = if self.always_touching { self.g(self.start()) } else { 0.0 };
         let mut turn = self.turn(x);
         for _ in 0..3 {
             if (turn.left_over - x).abs() <= 1e-14 * (1.0 + x) {
-                return from(turn, x);
+                return (x, turn);
             }
             x = turn.left_over;
             turn = self.turn(x);
@@ -87,16 +76,12 @@ impl Stretch {
         // what the turn began with, all but a shift below. Secants from above cross both in a few turns.
         let top = self.offset + 1.0;
         let ends = [x, top];
-        root::secant(
-            |at| {
-                (x, turn) = (at, self.turn(at));
-                turn.left_over - at
-            },
-            ends,
-            top,
-            1e-14 * (1.0 + top),
-        );
-        from(turn, x)
+        let change = |at| {
+            (x, turn) = (at, self.turn(at));
+            turn.left_over - at
+        };
+        root::secant(change, ends, top, 1e-14 * (1.0 + top));
+        (x, turn)
     }
 
     /// One turn that starts at touch-down with the stretch `x`.
@@ -160,13 +145,10 @@ impl Stretch {
             };
             visit(piece, phi, to, x);
             x = match piece {
-                Piece::Stick => x + self.kappa * (to - phi),
-                Piece::Recover => x - self.rho * (to - phi),
-                Piece::Slip => self.g(to),
+                Piece::Stick if to >= end => x + self.kappa * (to - phi),
+                Piece::Recover if to >= end => x - self.rho * (to - phi),
+                _ => self.g(to),
             };
-            if to < end && !matches!(piece, Piece::Slip) {
-                x = self.g(to);
-            }
             phi = to;
         }
         x.max(0.0)
@@ -208,19 +190,9 @@ impl Stretch {
 
     /// Where slip along `g` next becomes impossible: `g` rises faster than `kappa` or falls faster than `rho`.
     fn leave(&self, phi: f64, end: f64) -> f64 {
-        let mut first = end;
-        let mut consider = |p: f64| {
-            if p > phi + 1e-12 && p < first {
-                first = p;
-            }
-        };
-        if self.kappa < 1.0 {
-            consider(-PI + self.kappa.asin());
-        }
-        if self.rho < 1.0 {
-            consider(self.rho.asin());
-        }
-        first
+        let ends = [(self.kappa, -PI), (self.rho, 0.0)].into_iter().filter(|(rate, _)| *rate < 1.0);
+        let ahead = ends.map(|(rate, from)| from + rate.asin()).filter(|p| *p > phi + 1e-12);
+        ahead.fold(end, f64::min)
     }
 
     /// Samples a turn: `make(time from touch-down over period, reaction, lateral)`.

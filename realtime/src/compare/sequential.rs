@@ -37,7 +37,7 @@ pub(super) fn pulls(c: &Condition) -> [f64; PULLS] {
 }
 
 /// The running evidence.
-#[derive(Clone, Copy, Debug)]
+#[derive(Clone, Copy, Debug, Default)]
 pub struct Sequential {
     score: [f64; PULLS],
     information: [f64; PULLS],
@@ -46,16 +46,6 @@ pub struct Sequential {
 }
 
 impl Sequential {
-    /// No evidence yet.
-    pub(super) const fn new() -> Self {
-        Sequential {
-            score: [0.0; PULLS],
-            information: [0.0; PULLS],
-            log_scatter: [0.0; SCATTERS.len()],
-            worst: 0.0,
-        }
-    }
-
     /// Takes a standardised residual and the condition it came from (fixed before the residual was seen).
     pub(super) fn push(&mut self, z: f64, c: &Condition) {
         let z = z.clamp(-CAP, CAP);
@@ -76,10 +66,8 @@ impl Sequential {
             let spread = 1.0 + v * self.information[i];
             0.5 * (v * self.score[i] * self.score[i] / spread - spread.ln())
         };
-        let mut bets = [0.0; BETS];
-        for (i, bet) in bets.iter_mut().enumerate() {
-            *bet = if i < PULLS { shift(i) } else { self.log_scatter[i - PULLS] };
-        }
+        let bet = |i: usize| if i < PULLS { shift(i) } else { self.log_scatter[i - PULLS] };
+        let bets: [f64; BETS] = std::array::from_fn(bet);
         let most = bets.iter().copied().fold(f64::NEG_INFINITY, f64::max);
         let sum: f64 = bets.iter().map(|b| (b - most).exp()).sum();
         most + (sum / bets.len() as f64).ln()

@@ -144,7 +144,8 @@ pub fn run(parts: LoopParts, pacing: impl Into<Pacing>) -> LoopReport {
     switch_off(&mut ports, Nanos(now_ns().saturating_sub(origin_ns)));
     drop(awake);
     let (minor_faults, major_faults) = faults_between(faults_at_start, thread_faults());
-    let quantile = |q| lateness_histogram.value_at_quantile(q);
+    let [half, most, hundredth, thousandth] =
+        [0.5, 0.9, 0.99, 0.999].map(|q| lateness_histogram.value_at_quantile(q));
     LoopReport {
         grants,
         period_ns: period,
@@ -154,13 +155,7 @@ pub fn run(parts: LoopParts, pacing: impl Into<Pacing>) -> LoopReport {
         watch_drops,
         minor_faults,
         major_faults,
-        lateness_ns: [
-            quantile(0.5),
-            quantile(0.9),
-            quantile(0.99),
-            quantile(0.999),
-            lateness_histogram.max(),
-        ],
+        lateness_ns: [half, most, hundredth, thousandth, lateness_histogram.max()],
         panicked,
         histogram: lateness_histogram
             .iter_log(1_000, 2.0)

@@ -102,6 +102,12 @@ enum Trouble {
     Bad(String),
 }
 
+impl From<std::io::Error> for Trouble {
+    fn from(why: std::io::Error) -> Self {
+        Trouble::Bad(why.to_string())
+    }
+}
+
 impl<R: Read + Seek> Reader<R> {
     /// A reader at the beginning of a record.
     pub fn new(from: R) -> Self {
@@ -163,27 +169,26 @@ impl<R: Read + Seek> Reader<R> {
     }
 
     /// Reads the head of a record of the format: opcode, length, and the bytes themselves. `None` at the end of the file.
-    fn head(&mut self) -> std::io::Result<Result<Option<(u8, u64, [u8; HEAD])>, Trouble>> {
+    fn head(&mut self) -> Result<Option<(u8, u64, [u8; HEAD])>, Trouble> {
         if !self.fill(HEAD as u64)? {
-            return Ok(if self.body.is_empty() { Ok(None) } else { Err(Trouble::Short) });
+            return if self.body.is_empty() { Ok(None) } else { Err(Trouble::Short) };
         }
         let head: [u8; HEAD] = self.body[..].try_into().expect("as many bytes as requested");
         let length = u64::from_le_bytes(head[1..].try_into().expect("eight bytes"));
-        Ok(Ok(Some((head[0], length, head))))
+        Ok(Some((head[0], length, head)))
     }
 
     /// Reads the record of the format that begins at `at`, where the file is read now; `None` at the end of the file.
     fn record(&mut self, at: u64) -> Result<Option<(Sound, [u8; HEAD])>, Trouble> {
-        let bad = |e: std::io::Error| Trouble::Bad(e.to_string());
-        let size = self.size(at).map_err(bad)?;
-        let Some((opcode, length, head)) = self.head().map_err(bad)?? else { return Ok(None) };
+        let size = self.size(at)?;
+        let Some((opcode, length, head)) = self.head()? else { return Ok(None) };
         if !known(opcode) {
             return Err(Trouble::Bad(format!("no record is of the kind {opcode:#04x}")));
         }
         if length > LONGEST {
             return Err(Trouble::Bad(format!("a record of {length} bytes is longer than any")));
         }
-        if at + HEAD as u64 + length > size || !self.fill(length).map_err(bad)? {
+        if at + HEAD as u64 + length > size || !self.fill(length)? {
             return Err(Trouble::Short);
         }
         if self.is_outside(opcode) {
@@ -197,7 +202,7 @@ impl<R: Read + Seek> Reader<R> {
     }
 
     fn seek(&mut self, to: u64) -> Result<(), Trouble> {
-        self.from.seek(SeekFrom::Start(to)).map(|_| ()).map_err(|e| Trouble::Bad(e.to_string()))
+        Ok(self.from.seek(SeekFrom::Start(to)).map(drop)?)
     }
 
     /// The next place from `from` on where a sound record begins, by its checksum or by its form alone where
@@ -313,14 +318,11 @@ impl<R: Read + Seek> Reader<R> {
             checksum.update(&self.body);
         }
         match sound {
-            Sound::Nothing => None,
-            Sound::Chunk(messages) => {
-                self.messages = messages;
-                None
-            }
+            Sound::Nothing => {}
+            Sound::Chunk(messages) => self.messages = messages,
             Sound::Entry(entry) => {
                 self.heard(&entry);
-                Some(entry)
+                return Some(entry);
             }
             Sound::DataEnd(stated) => {
                 let found = self.checksum.replace(crc32fast::Hasher::new()).map(|c| c.finalize());
@@ -331,9 +333,9 @@ impl<R: Read + Seek> Reader<R> {
                     self.found.somewhere = Some(why.into());
                 }
                 self.part = Part::Index;
-                None
             }
         }
+        None
     }
 
     /// What the last words say of the messages, compared with those that came.
@@ -384,12 +386,11 @@ impl<R: Read + Seek> Reader<R> {
 
     /// Reads a record of the index and returns its length, 0 for the footer and what follows it.
     fn index_record(&mut self) -> Result<Option<u64>, Trouble> {
-        let bad = |e: std::io::Error| Trouble::Bad(e.to_string());
-        let Some((opcode, length, head)) = self.head().map_err(bad)?? else { return Ok(None) };
+        let Some((opcode, length, head)) = self.head()? else { return Ok(None) };
         if length > LONGEST {
             return Err(Trouble::Bad(format!("a record of {length} bytes is longer than any")));
         }
-        if !self.fill(length).map_err(bad)? {
+        if !self.fill(length)? {
             return Err(Trouble::Short);
         }
         let body = std::mem::take(&mut self.body);
@@ -408,13 +409,13 @@ impl<R: Read + Seek> Reader<R> {
             return Err(Trouble::Bad("its checksum does not agree".into()));
         }
         let magic = mcap::MAGIC;
-        if !self.fill(magic.len() as u64).map_err(bad)? {
+        if !self.fill(magic.len() as u64)? {
             return Err(Trouble::Short);
         }
         if self.body != magic {
             return Err(Trouble::Bad("the file does not end as an MCAP file does".into()));
         }
-        if self.fill(1).map_err(bad)? {
+        if self.fill(1)? {
             return Err(Trouble::Bad("something follows its end".into()));
         }
         Ok(Some(0))

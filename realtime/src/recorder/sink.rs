@@ -97,10 +97,10 @@ impl<W: Write> Sink<W> {
     ) -> Result<(), McapError> {
         let header =
             MessageHeader { channel_id: kind as u16 + 1, sequence, log_time, publish_time: log_time };
-        if self.chunk.is_none() {
-            self.chunk = Some(open_chunk()?);
-        }
-        let Some(chunk) = &mut self.chunk else { unreachable!("opened above") };
+        let chunk = match &mut self.chunk {
+            Some(chunk) => chunk,
+            none => none.insert(open_chunk()?),
+        };
         chunk.write_to_known_channel(&header, text)?;
         self.filled += text.len();
         if self.filled > CHUNK { self.close_chunk() } else { Ok(()) }

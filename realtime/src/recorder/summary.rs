@@ -4,13 +4,11 @@
 //! Format: MCAP specification 0, "Summary section" (<https://mcap.dev/spec>).
 
 use super::{TOPICS, schema};
-use mcap::McapError;
 use mcap::records::{Record, op};
+use mcap::{MAGIC, McapError};
 use std::collections::BTreeMap;
 use std::io::{BufReader, Read, Seek, SeekFrom, Write};
 
-/// First and last bytes of a file.
-const MAGIC: &[u8] = mcap::MAGIC;
 /// Bytes of index entries that are held before they are written.
 const HELD: usize = 256 * 1024;
 /// Length of an opcode and the length that follows it.
@@ -227,8 +225,7 @@ impl<F: Read + Write + Seek> Summary<'_, F> {
     /// Notes that everything since `from` is of one kind.
     fn group(&mut self, opcode: u8, from: u64) {
         if self.at > from {
-            let mut group = Bytes(vec![opcode]);
-            group = group.u64(from).u64(self.at - from);
+            let group = Bytes(vec![opcode]).u64(from).u64(self.at - from);
             group.record(op::SUMMARY_OFFSET, &mut self.offsets);
         }
     }

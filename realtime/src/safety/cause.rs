@@ -218,12 +218,9 @@ impl fmt::Display for Trip {
             write!(f, ": there is no {missing}")?;
         }
         if self.unit != Unit::Flag {
-            write!(
-                f,
-                ": {} (limit {})",
-                self.unit.beside(self.value, self.bound),
-                self.unit.beside(self.bound, self.value)
-            )?;
+            let [value, limit] = [(self.value, self.bound), (self.bound, self.value)]
+                .map(|(v, other)| self.unit.beside(v, other));
+            write!(f, ": {value} (limit {limit})")?;
         }
         write!(f, ", at {:.3} s", self.at.seconds())?;
         self.cause.requirement().map_or(Ok(()), |id| write!(f, " [{id}]"))

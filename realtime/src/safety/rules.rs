@@ -96,8 +96,8 @@ rules! {
     "SR-36" Interlock [Flag, Second] "An open, silent or broken interlock switches off." => |c| contact_open(c, &c.seen.contacts.interlock);
     "SR-02" DeadMan [Flag] "With a human finger, releasing the dead-man input switches off; it must be seen released, then held, before arming." => dead_man;
     "SR-03" Exposure [Second] "With a human finger, vibration in one go lasts no longer than its limit; only a rest of full length ends a go." => exposure;
-    "SR-04" NormalOverforce [Newton] "Normal force stays below its limit." => |c| overforce(c, Axis::Normal);
-    "SR-05" LateralOverforce [Newton] "Lateral force stays below its limit, either sign." => |c| overforce(c, Axis::Lateral);
+    "SR-04" NormalOverforce [Newton] "Normal force stays below its limit." => |c| overforce(c, &c.watch.normal, c.limits.normal_force_max_n, c.limits.timing.normal.period);
+    "SR-05" LateralOverforce [Newton] "Lateral force stays below its limit, either sign." => |c| overforce(c, &c.watch.lateral, c.limits.lateral_force_max_n, c.limits.timing.lateral.period);
     "SR-06" ForceRate [NewtonPerSecond] "Normal force does not change faster than its limit over two samples in a row." => |c| broken(c.watch.normal.fast_in_a_row >= 2, c.watch.normal.rate_n_s.abs(), c.limits.force_rate_max_n_s);
     "SR-07" OverAmplitude [Metre] "Measured amplitude stays below its limit." => |c| above(amplitude_pp_m(c), c.limits.amplitude_max.metres());
     "SR-08" AmplitudeRunaway [Metre] "Measured amplitude stays within 30 % (and 0.3 \u{b5}m) of what was commanded, ring-down allowed." => runaway;
@@ -189,20 +189,11 @@ fn following(c: &Context<'_>) -> Option<(f64, f64)> {
     broken(due && forwards < 0.2 * c.watch.slowest_m_s, forwards, 0.2 * c.watch.slowest_m_s)
 }
 
-enum Axis {
-    Lateral,
-    Normal,
-}
-
-fn overforce(c: &Context<'_>, axis: Axis) -> Option<(f64, f64)> {
-    let (watch, limit, timing) = match axis {
-        Axis::Lateral => (&c.watch.lateral, c.limits.lateral_force_max_n, &c.limits.timing.lateral),
-        Axis::Normal => (&c.watch.normal, c.limits.normal_force_max_n, &c.limits.timing.normal),
-    };
+fn overforce(c: &Context<'_>, watch: &ForceWatch, limit: f64, period: Nanos) -> Option<(f64, f64)> {
     // What is shown above the limit for two sample periods is no spike, whatever its counter says.
     let shown = watch
         .over_since
-        .filter(|since| c.now.since(*since).0 >= 2 * timing.period.0.max(c.limits.timing.cycle.0))
+        .filter(|since| c.now.since(*since).0 >= 2 * period.0.max(c.limits.timing.cycle.0))
         .map(|_| (watch.over_value, limit));
     above(watch.believed.map(|r| r.value.abs()), limit).or(shown)
 }

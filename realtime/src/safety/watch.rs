@@ -78,13 +78,14 @@ impl ForceWatch {
         bits_in_window(self.saturated)
     }
 
-    fn look(&mut self, channel: &Channel, limits: &Limits, axis: &Axis<'_>, now: Nanos) {
-        let timing = axis.timing;
+    /// Takes a cycle's channel; timing and largest force are those of its axis.
+    fn look(&mut self, channel: &Channel, limits: &Limits, axis: (&ChannelTiming, f64), now: Nanos) {
+        let (timing, force_max_n) = axis;
         let age_limit = timing.age_limit();
         self.spikes <<= 1;
         self.saturated <<= 1;
         if let Ok(reading) = channel {
-            let over = reading.value.abs() > axis.force_max_n;
+            let over = reading.value.abs() > force_max_n;
             self.over_since = if over { self.over_since.or(Some(now)) } else { None };
             self.over_value = reading.value.abs();
         }
@@ -155,12 +156,6 @@ impl ForceWatch {
         }
         self.usable = fresh;
     }
-}
-
-/// What sets one force axis apart from the other.
-struct Axis<'a> {
-    timing: &'a ChannelTiming,
-    force_max_n: f64,
 }
 
 /// Cycles of overrun bookkeeping: a thousand cycles in buckets of a hundred.
@@ -244,10 +239,9 @@ impl Watch {
 
     pub(super) fn look(&mut self, limits: &Limits, seen: &Observation, controls: Controls, now: Nanos) {
         let timing = &limits.timing;
-        let lateral = Axis { timing: &timing.lateral, force_max_n: limits.lateral_force_max_n };
-        self.lateral.look(&seen.forces.lateral, limits, &lateral, now);
-        let normal = Axis { timing: &timing.normal, force_max_n: limits.normal_force_max_n };
-        self.normal.look(&seen.forces.normal, limits, &normal, now);
+        let [lateral, normal] = [limits.lateral_force_max_n, limits.normal_force_max_n];
+        self.lateral.look(&seen.forces.lateral, limits, (&timing.lateral, lateral), now);
+        self.normal.look(&seen.forces.normal, limits, (&timing.normal, normal), now);
         self.hand_holds = match seen.contacts.dead_man {
             Ok(contact) => contact.closed && timing.contacts.is_fresh(contact.taken_at, now),
             Err(NoData::NotFitted) => limits.dead_man_key && controls.dead_man,
@@ -266,14 +260,10 @@ impl Watch {
         self.late[self.bucket] = self.late[self.bucket].saturating_add(missed);
 
         self.envelope.begin(controls.modulated, timing.response(), now);
-        let amplitude = match seen.amplifier {
-            Ok(state) => state.amplitude,
-            Err(reason) => Err(reason),
-        };
         if let Ok(state) = seen.amplifier {
             self.amplifier_on = state.output_on;
         }
-        if let Ok(reading) = amplitude {
+        if let Ok(reading) = seen.amplifier.and_then(|state| state.amplitude) {
             if let Some(before) = self.amplitude
                 && reading.sequence != before.sequence
             {

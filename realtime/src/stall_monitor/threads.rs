@@ -2,7 +2,7 @@
 #![allow(clippy::disallowed_methods, reason = "the monitor measures how late ordinary threads wake")]
 
 use super::{Stall, StallReport};
-use crate::pacing::{monotonic_ns, sleep_until};
+use crate::pacing::{monotonic_ns, pin_to, sleep_until};
 use crate::ports::Nanos;
 use std::sync::Arc;
 use std::sync::atomic::{AtomicBool, Ordering};
@@ -55,7 +55,8 @@ impl StallMonitor {
 }
 
 fn watch(cpu: usize, origin_ns: u64, end: &AtomicBool) -> StallReport {
-    bind_to(cpu);
+    // Where that is not allowed the thread still sees what happens to it.
+    let _ = pin_to(cpu);
     let mut seen = StallReport { latest: Vec::with_capacity(STORED), ..StallReport::default() };
     let mut deadline = monotonic_ns() + PERIOD_NS;
     while !end.load(Ordering::Relaxed) {
@@ -74,17 +75,6 @@ fn watch(cpu: usize, origin_ns: u64, end: &AtomicBool) -> StallReport {
         deadline = if late >= PERIOD_NS { now + PERIOD_NS } else { deadline + PERIOD_NS };
     }
     seen
-}
-
-/// Binds the calling thread to a CPU. Where that is not allowed the thread still sees what happens to it.
-fn bind_to(cpu: usize) {
-    // SAFETY: `set` is plain data, valid when zeroed; CPU_SET stays inside it as `cpu` is below CPUS; the
-    // call reads it for the calling thread (pid 0) only.
-    unsafe {
-        let mut set: libc::cpu_set_t = std::mem::zeroed();
-        libc::CPU_SET(cpu, &mut set);
-        libc::sched_setaffinity(0, size_of::<libc::cpu_set_t>(), &set);
-    }
 }
 
 #[cfg(test)]

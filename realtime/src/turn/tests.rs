@@ -4,7 +4,7 @@
 use super::*;
 use crate::cycle::Command;
 use crate::ports::{AmplifierState, Contact, Contacts, Forces, NoData, StageState, SupplyState};
-use crate::safety::{DriveCommand, StageCommand};
+use crate::safety::{Decision, DriveCommand, StageCommand};
 
 /// A rig of which only the switch and the contacts are there.
 struct Rig;
@@ -90,20 +90,26 @@ fn a_row_is_what_the_cycle_said() {
     };
     let inputs = Inputs { commands: [Some(Command::Reset), None, None, None], seen };
     for (supply, cut) in [(SupplyCommand::Cut, true), (SupplyCommand::Restore, false)] {
-        let out = Outputs {
+        let decision = Decision {
             drive: DriveCommand::off(1, Nanos(50)),
             stage: StageCommand::stop(1, Nanos(50)),
             supply,
             tripped: None,
+            armed_now: false,
             blocking: Some(Cause::Stopped),
             waits_for: Some(Cause::EmergencyStop),
+            lateral_usable: !cut,
+            normal_usable: !cut,
+            remark: Some(Remark::AmplitudeSags),
+        };
+        let out = Outputs {
+            decision,
             armed: !cut,
             proving: cut,
             marker: Marker { point: 9, ..Marker::default() },
             mu_relative: Err(NoMu::NoContact),
             online: None,
             usable: !cut,
-            remark: Some(Remark::AmplitudeSags),
             rendered: Some(Rendered {
                 wanted: 0.6,
                 amplitude: models::quantity::PeakToPeak::from_metres(1e-6),
@@ -117,9 +123,12 @@ fn a_row_is_what_the_cycle_said() {
         assert_eq!((row.cycle, row.now, row.inputs), (12, Nanos(34), inputs));
         assert_eq!((row.drive_pp_m, row.drive_hz, row.velocity_m_s, row.load_n), (0.0, 0.0, 0.0, 0.0));
         assert_eq!((row.supply_cut, row.proving, row.armed, row.usable), (cut, cut, !cut, !cut));
-        assert_eq!((row.marker, row.tripped, row.blocking), (out.marker, out.tripped, out.blocking));
-        assert_eq!(row.waits_for, out.waits_for);
-        assert_eq!((row.mu_relative, row.online, row.remark), (out.mu_relative, out.online, out.remark));
+        assert_eq!(
+            (row.marker, row.tripped, row.blocking),
+            (out.marker, decision.tripped, decision.blocking)
+        );
+        assert_eq!((row.waits_for, row.remark), (decision.waits_for, decision.remark));
+        assert_eq!((row.mu_relative, row.online), (out.mu_relative, out.online));
         assert_eq!(row.rendered, out.rendered);
     }
 }

@@ -5,7 +5,6 @@ use realtime::ports::{Nanos, NoData, Quality};
 use runs::calibrate::SeriesOptions;
 use runs::setup::Setup;
 use runs::{ask, say};
-use std::fmt::Write as _;
 use std::io::BufRead;
 use std::path::{Path, PathBuf};
 use std::time::{Duration, Instant, SystemTime, UNIX_EPOCH};
@@ -81,15 +80,12 @@ pub fn series(way: &SeriesOptions<'_>) -> miette::Result<String> {
             Ok(t) => {
                 // The middle of the readings that were averaged, which a link that went down may have put off.
                 let time_s = series.time_s() - 0.5 * t.length_s;
-                series.rows.push(format!(
-                    "{time_s:.6},{axis},{mass},{},{},{branch},{}",
-                    t.counts[0],
-                    t.counts[1],
-                    u8::from(t.saturated)
-                ));
+                let ([lateral, normal], saturated) = (t.counts, u8::from(t.saturated));
+                let row = format!("{time_s:.6},{axis},{mass},{lateral},{normal},{branch},{saturated}");
+                series.rows.push(row);
                 series.write()?;
                 // Printed only after it is stored.
-                say!("  lateral {:.2}, normal {:.2} counts{}", t.counts[0], t.counts[1], t.note);
+                say!("  lateral {lateral:.2}, normal {normal:.2} counts{}", t.note);
             }
             Err(why) => say!("  no reading: {why}; try again"),
         }
@@ -136,11 +132,8 @@ impl Series {
     }
 
     fn text(&self) -> String {
-        let mut text = format!("{BEGAN}{:.6}\n{HEADER}\n", self.began_unix_s);
-        for row in &self.rows {
-            let _ = writeln!(text, "{row}");
-        }
-        text
+        let rows = self.rows.iter().map(|row| format!("{row}\n")).collect::<String>();
+        format!("{BEGAN}{:.6}\n{HEADER}\n{rows}", self.began_unix_s)
     }
 
     fn write(&self) -> miette::Result<()> {

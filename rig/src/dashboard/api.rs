@@ -11,7 +11,7 @@ use axum::routing::{get, post};
 use axum::{Json, Router};
 use runs::catalogue::Annotations;
 use runs::compare::groups::{GroupBy, MOST_COMPARED};
-use runs::report::{EXPLORE, FIGURES, UPLOT, UPLOT_STYLE};
+use runs::report::{EXPLORE, FIGURES, UPLOT, UPLOT_STYLE, scoped_style};
 use serde::Deserialize;
 use std::sync::{Arc, PoisonError};
 use std::time::Duration;
@@ -54,10 +54,7 @@ pub fn routes(shared: Arc<Shared>) -> Router {
         .route("/app.js", get(|| asset("text/javascript", include_str!("assets/app.js"))))
         .route("/plots.js", get(|| asset("text/javascript", FIGURES)))
         .route("/explore.js", get(|| asset("text/javascript", EXPLORE)))
-        .route(
-            "/report.css",
-            get(|| async { asset("text/css", &runs::report::scoped_style(".report")).await }),
-        )
+        .route("/report.css", get(|| async { asset("text/css", &scoped_style(".report")).await }))
         .route("/uplot.css", get(|| asset("text/css", UPLOT_STYLE)))
         .route("/uplot.js", get(|| asset("text/javascript", UPLOT)))
         .merge(data)
@@ -149,13 +146,8 @@ async fn run(State(shared): State<Arc<Shared>>, Path(name): Path<String>) -> Res
         (diagnoses.under_way.as_ref() == Some(&name), diagnoses.failed.get(&name).cloned())
     };
     let found = beside(move || pages::run(&shared.options.runs, &name)).await?;
-    Ok(found.map_or_else(
-        |why| failed_to(&why),
-        |run| {
-            Json(serde_json::json!({ "run": run, "diagnosing": diagnosing, "undiagnosed": failed }))
-                .into_response()
-        },
-    ))
+    let answer = |run| serde_json::json!({ "run": run, "diagnosing": diagnosing, "undiagnosed": failed });
+    Ok(found.map_or_else(|why| failed_to(&why), |run| Json(answer(run)).into_response()))
 }
 
 async fn report(State(shared): State<Arc<Shared>>, Path(name): Path<String>) -> Result<Response, Response> {
@@ -267,11 +259,11 @@ async fn compare(
     State(shared): State<Arc<Shared>>,
     Query(several): Query<Several>,
 ) -> Result<Response, Response> {
-    let folders: Result<Vec<_>, _> = several.runs.split('/').map(|name| folder(&shared, name)).collect();
-    let folders = folders?;
+    let names = several.runs.split('/');
+    let folders = names.map(|name| folder(&shared, name)).collect::<Result<Vec<_>, _>>()?;
     if !(2..=MOST_COMPARED).contains(&folders.len()) {
-        return Err((StatusCode::UNPROCESSABLE_ENTITY, format!("2 to {MOST_COMPARED} runs are compared"))
-            .into_response());
+        let why = format!("2 to {MOST_COMPARED} runs are compared");
+        return Err((StatusCode::UNPROCESSABLE_ENTITY, why).into_response());
     }
     let found = beside(move || pages::compare(&folders, several.by)).await?;
     Ok(found.map_or_else(|why| failed_to(&why), html))

@@ -153,14 +153,8 @@ impl Client {
         let advertised = json!({ "op": "advertise", "channels": channels.collect::<Vec<_>>() });
         let info = json!({ "op": "serverInfo", "name": format!("muprime {version}"), "capabilities": [],
                            "metadata": { "muprime_version": version, "live_runs": live } });
-        self.send(&info).await
-            && self.send(&advertised).await
-            && self
-                .status(
-                    INFO,
-                    &format!("live runs: {}", if live.is_empty() { "none yet" } else { live.as_str() }),
-                )
-                .await
+        let words = format!("live runs: {}", if live.is_empty() { "none yet" } else { live.as_str() });
+        self.send(&info).await && self.send(&advertised).await && self.status(INFO, &words).await
     }
 
     /// Passes a run's message on; whether the client took it.

@@ -14,7 +14,7 @@ const ASKS: usize = 20;
 /// Time over which asks are counted.
 const WITHIN: Duration = Duration::from_secs(10);
 
-/// Checks requests.
+/// Checks requests. What it refuses comes with the status to answer with.
 pub struct Guard {
     hosts: Vec<String>,
     /// Further origins that may read streams, and nothing else.
@@ -47,9 +47,6 @@ impl Guard {
 
     /// Whether a request names this server by a name that it has, and comes from one of its own pages or
     /// from no page at all; a `stream` may also be read from the further origins.
-    ///
-    /// # Errors
-    /// The status to answer with.
     pub fn place(&self, headers: &HeaderMap, stream: bool) -> Result<(), StatusCode> {
         let one = |name| {
             let mut all = headers.get_all(name).iter();
@@ -72,9 +69,6 @@ impl Guard {
 
     /// Whether a request has the token: in `Authorization: Bearer`, beside [`PROTOCOL`] among the protocols
     /// of a live stream, or as `token` in the `query` of an address that may have it there.
-    ///
-    /// # Errors
-    /// The status to answer with.
     pub fn token_of(&self, headers: &HeaderMap, query: Option<&str>) -> Result<(), StatusCode> {
         let text = |name| headers.get(name).and_then(|v| v.to_str().ok());
         let bearer = text(header::AUTHORIZATION).and_then(|v| v.strip_prefix("Bearer "));
@@ -91,10 +85,7 @@ impl Guard {
         }
     }
 
-    /// Counts an ask.
-    ///
-    /// # Errors
-    /// The status to answer with, where there were too many of late.
+    /// Counts an ask; refuses it where there were too many of late.
     pub fn count(&self) -> Result<(), StatusCode> {
         let mut recent = self.recent.lock().unwrap_or_else(std::sync::PoisonError::into_inner);
         let now = now();

@@ -168,20 +168,16 @@ fn sweep(text: &mut Text<'_>) {
     let trips = |v: &View| counted(v.events.iter().filter(|e| matches!(e.event, Event::Tripped(_))).count());
     text.counter("trips", None, "safety trips of this session", &trips);
     let driven = |v: &View| last(v)?.driven_s;
-    text.counter(
-        "driven_seconds",
-        Some("seconds"),
-        "time that the plate was driven in this session",
-        &driven,
-    );
+    let help = "time that the plate was driven in this session";
+    text.counter("driven_seconds", Some("seconds"), help, &driven);
     let (dose, unit) = ("dose_square_meters_per_second", Some("square_meters_per_second"));
-    text.counter(dose, unit, "squared rms velocity of the plate summed over that time", &|v| {
-        last(v)?.dose_m2_s
-    });
+    let help = "squared rms velocity of the plate summed over that time";
+    text.counter(dose, unit, help, &|v| last(v)?.dose_m2_s);
     let left = |v: &View| {
-        let left =
-            |event: &Event| if let Event::ExposureLeft(left) = event { Some(left.hour_s) } else { None };
-        v.events.iter().rev().find_map(|timed| left(&timed.event))
+        v.events.iter().rev().find_map(|timed| match &timed.event {
+            Event::ExposureLeft(left) => Some(left.hour_s),
+            _ => None,
+        })
     };
     let help = "what was left of the finger's exposure in an hour at the last arming";
     text.gauge("exposure_left_seconds", Some("seconds"), help, &left);
@@ -201,19 +197,13 @@ fn state_of(view: &View) -> &'static str {
 /// The deadlines of the loop.
 fn lateness(text: &mut Text<'_>) {
     let deadlines = |view: &View| last(view).map(|state| state.deadlines);
-    text.counter("loop_cycles", None, "cycles of the loop in this session", &|v| {
-        Some(deadlines(v)?.cycles as f64)
-    });
-    text.counter("loop_missed_cycles", None, "deadlines that were missed", &|v| {
-        Some(deadlines(v)?.missed as f64)
-    });
-    let name = "deadline_lateness_seconds";
-    text.family(
-        name,
-        "histogram",
-        Some("seconds"),
-        "lateness of every deadline of the loop, missed ones too",
-    );
+    let cycles = |view: &View| Some(deadlines(view)?.cycles as f64);
+    text.counter("loop_cycles", None, "cycles of the loop in this session", &cycles);
+    let missed = |view: &View| Some(deadlines(view)?.missed as f64);
+    text.counter("loop_missed_cycles", None, "deadlines that were missed", &missed);
+    let (name, help) =
+        ("deadline_lateness_seconds", "lateness of every deadline of the loop, missed ones too");
+    text.family(name, "histogram", Some("seconds"), help);
     // The samples of one histogram come one after the other.
     for (run, view) in &text.runs {
         let Some(deadlines) = deadlines(view) else { continue };

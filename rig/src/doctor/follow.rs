@@ -87,10 +87,7 @@ impl Follow {
         }
         self.values.push(seen.value);
         self.saturated += u64::from(seen.quality == Quality::Saturated);
-        let equal = match (last.raw, seen.raw) {
-            (Some(last), Some(now)) => last == now,
-            _ => false,
-        };
+        let equal = seen.raw.is_some() && last.raw == seen.raw;
         self.equal_in_a_row = if equal { self.equal_in_a_row + 1 } else { 1 };
         self.equal_most = self.equal_most.max(self.equal_in_a_row);
     }
@@ -138,11 +135,9 @@ impl ChannelReport {
             (Some(mean), _) => format!("{}, noise {noise}, ", quantity(mean, self.unit)),
             (None, why) => why.map_or("nothing, ".into(), |why| format!("{why}, ")),
         };
+        let limit = self.age_limit_ms;
         let ages = self.age_ms.map_or("-".into(), |[half, most, all]| {
-            format!(
-                "median {half:.1}, 99 % {most:.1}, greatest {all:.1} ms (limit {:.0} ms)",
-                self.age_limit_ms
-            )
+            format!("median {half:.1}, 99 % {most:.1}, greatest {all:.1} ms (limit {limit:.0} ms)")
         });
         let share = |share: f64| format!("{:.1} %", share * 1e2);
         format!(

@@ -2,7 +2,7 @@
 
 use super::{Answers, ChannelReport, Found, Look};
 use drivers::OpenError;
-use realtime::ports::{AmplifierState, Contact, NoData, StageState};
+use realtime::ports::{AmplifierState, Contact, NoData, Sample, StageState};
 use realtime::safety::RULES;
 use runs::plan::Plan;
 use runs::report::human::quantity;
@@ -36,13 +36,8 @@ impl Finding {
         found: impl Into<String>,
         advice: impl Into<String>,
     ) -> Self {
-        Finding {
-            subject: subject.into(),
-            good,
-            found: found.into(),
-            advice: advice.into(),
-            ..Finding::default()
-        }
+        let (subject, found, advice) = (subject.into(), found.into(), advice.into());
+        Finding { subject, good, found, advice, ..Finding::default() }
     }
 }
 
@@ -147,11 +142,8 @@ fn instrument(found: &Found, look: &Look, target: &Target<'_>) -> Finding {
         if found.role == "force" {
             states.push(match (channel.mean, channel.missing) {
                 (Some(mean), None) => format!("{} {}", channel.name, quantity(mean, "N")),
-                (_, why) => format!(
-                    "{} missing: {}",
-                    channel.name,
-                    why.map_or("nothing came".into(), |why| why.to_string())
-                ),
+                (_, None) => format!("{} missing: nothing came", channel.name),
+                (_, Some(why)) => format!("{} missing: {why}", channel.name),
             });
             force(channel, target, &mut problems);
         }
@@ -218,11 +210,8 @@ fn timely(c: &ChannelReport, problems: &mut Vec<Problem>) {
 /// Samples at the ends of the range.
 fn saturated(c: &ChannelReport, problems: &mut Vec<Problem>) {
     if c.saturated_share > INVALID_SHARE {
-        let problem = format!(
-            "{}: {:.0} % of its samples are at the end of its range",
-            c.name,
-            c.saturated_share * 1e2
-        );
+        let (name, percent) = (c.name, c.saturated_share * 1e2);
+        let problem = format!("{name}: {percent:.0} % of its samples are at the end of its range");
         problems.push((problem, "unload and zero it, or use one of a larger range; a range in the profile that is too narrow does the same"));
     }
 }
@@ -251,10 +240,8 @@ fn force(c: &ChannelReport, target: &Target<'_>, problems: &mut Vec<Problem>) {
         && (c.equal_in_a_row >= frozen_after || u64::from(c.equal_in_a_row) >= c.samples);
     if still {
         let problem = format!("{name}: frozen, one value {} times in a row", c.equal_in_a_row);
-        problems.push((
-            problem,
-            "switch the sensor off and on; if its noise is below one count, raise `frozen_after`",
-        ));
+        let advice = "switch the sensor off and on; if its noise is below one count, raise `frozen_after`";
+        problems.push((problem, advice));
     }
     let Some(mean) = c.mean else { return };
     if mean.abs() > most {
@@ -272,10 +259,8 @@ fn force(c: &ChannelReport, target: &Target<'_>, problems: &mut Vec<Problem>) {
     if let Some(noise) = c.noise_sd.filter(|sd| *sd > NOISE_TIMES * stated && mean.abs() <= most) {
         let problem =
             format!("{name}: its noise is {:.1} mN, and {:.1} mN are stated", noise * 1e3, stated * 1e3);
-        problems.push((
-            problem,
-            "check cable, shield and ground, the unit in its profile, and that nothing moves",
-        ));
+        let advice = "check cable, shield and ground, the unit in its profile, and that nothing moves";
+        problems.push((problem, advice));
     }
 }
 
@@ -313,10 +298,8 @@ fn amplifier(
     if setup.config.limits.temperature_fitted && s.temperature_c == Err(NoData::NotFitted) {
         problems.push(("it has no thermometer, and a run waits for one".into(), THERMOMETER));
     }
-    if let Ok(w) = s.amplitude
-        && !s.output_on
-        && w.value.abs() > OFF_AMPLITUDE_PP_M
-    {
+    let vibrates = |w: &Sample| !s.output_on && w.value.abs() > OFF_AMPLITUDE_PP_M;
+    if let Some(w) = s.amplitude.ok().filter(vibrates) {
         let problem = format!("it is off, and its plate is read at {} peak-to-peak", quantity(w.value, "m"));
         problems.push((problem, "check the amplitude's zero, unit and `measured_m_per_unit`"));
     }
@@ -368,12 +351,12 @@ fn contacts(look: &Look, states: &mut Vec<String>, problems: &mut Vec<Problem>) 
 /// Whether the loop's own rules would let a sweep begin.
 fn arming(look: &Look) -> Finding {
     match look.blocking.filter(|(_, share)| *share > INVALID_SHARE) {
-        None if look.supply_is_open() => {
-            let found = "the rules of the loop would let it begin; whether the amplifier has a fault of its own shows when arming \
-                         closes its supply";
-            Finding::new("a sweep", true, found, "")
+        None => {
+            let open = "; whether the amplifier has a fault of its own shows when arming closes its supply";
+            let found = "the rules of the loop would let it begin";
+            let open = if look.supply_is_open() { open } else { "" };
+            Finding::new("a sweep", true, format!("{found}{open}"), "")
         }
-        None => Finding::new("a sweep", true, "the rules of the loop would let it begin", ""),
         Some((cause, share)) => {
             let rule = RULES.iter().find(|rule| rule.cause == cause);
             let (id, text) = rule.map_or(("", ""), |rule| (rule.id, rule.text));

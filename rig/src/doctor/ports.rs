@@ -2,11 +2,9 @@
 
 use super::Role;
 use drivers::endpoint::Endpoint;
-use drivers::ports::{AmplifierPort, ContactsPort, ForcePort, StagePort, SupplyPort};
+use drivers::ports::{AmplifierPort, ContactsPort, ForcePort, Merged, StagePort, SupplyPort};
 use drivers::{HealthReport, InstrumentSetup, InstrumentsSetup, Links, OpenError};
-use realtime::ports::{
-    Amplifier, Contacts, ForceSensor, Forces, Nanos, NoData, SafetyInputs, Stage, SupplySwitch,
-};
+use realtime::ports::{Amplifier, Contacts, ForceSensor, Nanos, NoData, SafetyInputs, Stage, SupplySwitch};
 use realtime::safety::Observation;
 use runs::setup::Setup;
 use std::time::Instant;
@@ -30,21 +28,6 @@ fn open_one(role: Role, instrument: &InstrumentSetup, epoch: Instant) -> Result<
     }
     .map_err(|problem| instrument.mismatch(problem))?;
     Ok((drivers::open_one(instrument, endpoint, epoch)?, port))
-}
-
-/// The force instruments as one port, each axis from the first that gives it.
-struct Merged(Vec<(ForcePort, (bool, bool))>);
-
-impl ForceSensor for Merged {
-    fn read(&mut self, now: Nanos) -> Forces {
-        let mut forces = Forces::missing(NoData::NotFitted);
-        for (port, (lateral, normal)) in self.0.iter_mut().rev() {
-            let read = port.read(now);
-            forces.lateral = if *lateral { read.lateral } else { forces.lateral };
-            forces.normal = if *normal { read.normal } else { forces.normal };
-        }
-        forces
-    }
 }
 
 /// An instrument, and its link where it could be opened.

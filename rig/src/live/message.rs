@@ -30,7 +30,7 @@ pub enum Message {
 }
 
 /// What a run is of.
-#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
 pub struct Run {
     /// Its folder.
     pub folder: PathBuf,
@@ -209,7 +209,7 @@ pub struct Progress {
 }
 
 /// How a run ended.
-#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
 pub struct Ended {
     /// Its outcome; `None` where it failed before or beside its sweep.
     pub outcome: Option<Outcome>,
@@ -234,13 +234,7 @@ impl Ended {
                 off: Some(summary.off.words()),
                 agreement: Some(summary.agreement.to_string()),
             },
-            Err(why) => Ended {
-                outcome: None,
-                remedy: None,
-                error: Some(format!("{why:#}")),
-                off: None,
-                agreement: None,
-            },
+            Err(why) => Ended { error: Some(format!("{why:#}")), ..Ended::default() },
         }
     }
 }

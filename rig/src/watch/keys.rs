@@ -56,12 +56,12 @@ impl Hand {
 
     /// Has the run rest before its next pass, or go on; says what comes of it.
     fn pause(&self, ask: Ask) -> String {
-        let done = match (&self.own, ask) {
-            (Some(signals), ask) => {
+        let done = match &self.own {
+            Some(signals) => {
                 signals.paused.store(ask == Ask::Pause, Ordering::Relaxed);
                 true
             }
-            (None, ask) => self.by_feed(ask),
+            None => self.by_feed(ask),
         };
         match (done, ask) {
             (true, Ask::Pause) => {

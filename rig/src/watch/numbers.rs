@@ -53,11 +53,10 @@ pub fn phase(phase: Phase) -> &'static str {
 /// The numbers of the last cycle, most needed first.
 pub fn of_state(view: &View) -> Vec<(&'static str, String)> {
     // What the last cycle showed is no state of a rig that nobody leads any more.
-    if view.ended.is_some() {
-        return [vec![("rig", "none: the run is over".into())], last_pass(view)].concat();
-    }
-    let Some(s) = view.states.back() else {
-        return [vec![("rig", "none: no cycle was received".into())], last_pass(view)].concat();
+    let over = view.ended.is_some();
+    let Some(s) = view.states.back().filter(|_| !over) else {
+        let why = if over { "none: the run is over" } else { "none: no cycle was received" };
+        return [vec![("rig", why.into())], last_pass(view)].concat();
     };
     // A running mu' is there while a pass slides only.
     let slides = matches!(s.phase, Phase::Settle | Phase::Measure | Phase::Edges);

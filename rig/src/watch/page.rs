@@ -71,7 +71,7 @@ pub fn draw(page: &Page<'_>, buffer: &mut Buffer) {
     let last = area.height - 1;
     let rest = Rect::new(0, below, area.width, last - below);
     if page.help {
-        put(buffer, rest, help(page).into_iter().map(|text| (text, Style::new())));
+        put(buffer, rest, help(page).map(|text| (text.to_string(), Style::new())));
     } else {
         tellings(page, buffer, rest);
     }
@@ -170,28 +170,23 @@ fn state(page: &Page<'_>) -> (String, Style) {
         return ("TRIPPED: off, at rest, lifted; latched".into(), look.alarm());
     }
     let Some(s) = view.states.back() else {
-        return match page.source {
-            Source::Folder(Some(why)) => (
-                format!("RUNS: passes from its folder only, there is no feed ({})", plain(why)),
-                look.heading(),
-            ),
-            _ => ("WAITING for the first cycle".into(), look.heading()),
+        let words = match page.source {
+            Source::Folder(Some(why)) => {
+                format!("RUNS: passes from its folder only, there is no feed ({})", plain(why))
+            }
+            _ => "WAITING for the first cycle".into(),
         };
+        return (words, look.heading());
     };
     if page.silent_s > SILENT_S {
-        return (
-            format!("NOTHING HEARD for {}: what stands below is old", duration(page.silent_s)),
-            look.alarm(),
-        );
+        let words = format!("NOTHING HEARD for {}: what stands below is old", duration(page.silent_s));
+        return (words, look.alarm());
     }
     if view.paused {
         return ("PAUSED: no drive, lifted off, armed; r goes on".into(), look.strong(Color::Yellow));
     }
-    let at = format!(
-        "{}, point {}",
-        phase(s.phase),
-        if s.point == u32::MAX { "none".into() } else { s.point.to_string() }
-    );
+    let point = if s.point == u32::MAX { "none".into() } else { s.point.to_string() };
+    let at = format!("{}, point {point}", phase(s.phase));
     match (s.armed, s.blocking) {
         (true, _) => (format!("ARMED: {at}"), look.strong(Color::Green)),
         (false, Some(cause)) => (format!("NOT ARMED: {}", cause.words()), look.strong(Color::Yellow)),
@@ -295,7 +290,7 @@ fn keys(page: &Page<'_>) -> String {
     }
 }
 
-fn help(page: &Page<'_>) -> Vec<String> {
+fn help(page: &Page<'_>) -> [&'static str; 4] {
     let leave = if page.own { "q: nothing; the view ends with the run" } else { "q: leave; the run goes on" };
     [
         "s, Ctrl-C: stop, safe state at once  p: pause before the next pass  r: resume",
@@ -303,6 +298,4 @@ fn help(page: &Page<'_>) -> Vec<String> {
         "lateral force: in the sensor's frame; normal: + in compression; mu' = mu/mu_0",
         "residual: measured - predicted, z in sd; surprise: after the passes before it",
     ]
-    .map(String::from)
-    .to_vec()
 }

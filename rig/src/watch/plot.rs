@@ -116,11 +116,8 @@ fn rounded_up(value: f64) -> f64 {
     }
     let decade = 10f64.powf(value.log10().floor());
     let steps = [1.0, 2.0, 3.0, 4.0, 5.0, 6.0, 8.0, 10.0];
-    steps
-        .into_iter()
-        .map(|step| step * decade)
-        .find(|bound| *bound >= value * 0.999_999)
-        .unwrap_or(10.0 * decade)
+    let mut bounds = steps.into_iter().map(|step| step * decade);
+    bounds.find(|bound| *bound >= value * 0.999_999).unwrap_or(10.0 * decade)
 }
 
 /// Columns of the labels of mu'.
@@ -144,12 +141,8 @@ pub fn curve(buffer: &mut Buffer, area: Rect, look: Look, view: &View) {
         })
         .filter(|(w, ..)| w.is_finite())
         .collect();
-    let field = Rect {
-        x: area.x + GUTTER + 1,
-        y: area.y + 1,
-        width: area.width - GUTTER - 1,
-        height: area.height - 3,
-    };
+    let (width, height) = (area.width - GUTTER - 1, area.height - 3);
+    let field = Rect { x: area.x + GUTTER + 1, y: area.y + 1, width, height };
     let all = || marks.iter().flat_map(|(_, m, p)| [*m, *p]).flatten();
     let high = all().fold(1.0, f64::max);
     let high = if high <= 1.05 { 1.05 } else { rounded_up(high) };
@@ -164,20 +157,12 @@ pub fn curve(buffer: &mut Buffer, area: Rect, look: Look, view: &View) {
     let axis = format!("     +{}", "-".repeat(field.width.into()));
     buffer.set_stringn(area.x, field.bottom(), axis, area.width.into(), Style::new());
     let most = format!("{widest}");
-    let under = format!(
-        "      0{:^1$}",
-        "w, um peak-to-peak",
-        usize::from(field.width).saturating_sub(1 + most.len())
-    );
+    let between = usize::from(field.width).saturating_sub(1 + most.len());
+    let under = format!("      0{:^between$}", "w, um peak-to-peak");
     buffer.set_stringn(area.x, field.bottom() + 1, format!("{under}{most}"), area.width.into(), Style::new());
     if marks.is_empty() {
-        buffer.set_stringn(
-            field.x + 2,
-            field.y + field.height / 2,
-            "no pass so far",
-            field.width.saturating_sub(2).into(),
-            Style::new(),
-        );
+        let (x, y, width) = (field.x + 2, field.y + field.height / 2, field.width.saturating_sub(2));
+        buffer.set_stringn(x, y, "no pass so far", width.into(), Style::new());
         return;
     }
     let place = |w: f64, v: f64| {

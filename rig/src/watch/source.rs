@@ -102,9 +102,9 @@ fn end_of(folder: &Path) -> Ended {
     match summary(folder) {
         Some(summary) => Ended::of(&Ok(summary)),
         None => {
-            let error = "it has no summary: its process ended without one".to_string();
+            let error = Some("it has no summary: its process ended without one".into());
             let off = Some("nobody has seen whether the drive is off: check the amplifier".into());
-            Ended { outcome: None, remedy: None, error: Some(error), off, agreement: None }
+            Ended { error, off, ..Ended::default() }
         }
     }
 }
@@ -131,9 +131,7 @@ fn run_of(folder: &Path) -> Option<Run> {
         sample: fact("sample"),
         started_unix_s,
         fast: fact("clock").is_some_and(|clock| clock == "virtual"),
-        process: 0,
-        planned: 0,
-        made_before: 0,
         guards: Guards::of_facts(fact),
+        ..Run::default()
     })
 }

@@ -38,14 +38,14 @@ pub enum World {
 impl World {
     fn read(&self, at: usize) -> f64 {
         match self {
-            World::Virtual(rig) => rig.rig().world().room().of(AIRS[at]),
+            World::Virtual(rig) => rig.rig().world().room.of(AIRS[at]),
             World::Served(plant) => plant.now().0.measure(QUANTITIES[at]),
         }
     }
 
     fn set(&self, at: usize, value: f64) {
         match self {
-            World::Virtual(rig) => rig.rig().world_mut().room_mut().set(AIRS[at], value),
+            World::Virtual(rig) => rig.rig().world_mut().room.set(AIRS[at], value),
             World::Served(plant) => plant.now().0.command(&[(COMMANDS[at], value)]),
         }
     }
@@ -63,10 +63,7 @@ pub enum Answers {
 
 impl Answers {
     /// The answers of a file: one a line; empty lines and those that begin with # are left out.
-    ///
-    /// # Errors
-    /// A file that cannot be read.
-    pub fn of_file(path: &Path) -> miette::Result<Self> {
+    fn of_file(path: &Path) -> miette::Result<Self> {
         let text = crate::input::text_of(path)?;
         let line =
             |line: &str| Some(line.trim().to_string()).filter(|l| !l.is_empty() && !l.starts_with('#'));
@@ -74,10 +71,7 @@ impl Answers {
     }
 
     /// The terminal's lines, read on a thread of their own.
-    ///
-    /// # Errors
-    /// The input is not a terminal: nobody is there to answer.
-    pub fn of_terminal() -> miette::Result<Self> {
+    fn of_terminal() -> miette::Result<Self> {
         if !std::io::stdin().is_terminal() {
             miette::bail!(
                 help =
@@ -141,16 +135,8 @@ impl Bench {
             miette::miette!(help = "check its address and power", "the chamber does not answer: {why}")
         })?;
         let source = if world.is_some() { Source::Simulated } else { Source::Instrument };
-        Ok(Bench {
-            chamber,
-            world,
-            answers,
-            source,
-            question: None,
-            looked: None,
-            problem: None,
-            valve_turned: None,
-        })
+        let (question, looked, problem, valve_turned) = (None, None, None, None);
+        Ok(Bench { chamber, world, answers, source, question, looked, problem, valve_turned })
     }
 
     /// Serves what a row led to: set-points out, readings and answers in.

@@ -121,19 +121,13 @@ pub fn certified(args: &Args, bench: &dyn Bench) -> miette::Result<Issued> {
     };
     let gain = fit(&table, form, args.vibrometer_relative_sd).map_err(refused(&path))?;
     let mut points = |path: &PathBuf, at: &str| points_of(&mut sources, path, at);
-    let resonance = match &args.sweep {
-        None => None,
-        Some(path) => Some(sweep(&points(path, "frequency_hz")?).map_err(refused(path))?),
-    };
-    let shape = match &args.map {
-        None => None,
-        Some(path) => Some(mode_shape(&points(path, "position_m")?).map_err(refused(path))?),
-    };
+    let resonance = |path| sweep(&points(path, "frequency_hz")?).map_err(refused(path));
+    let resonance = args.sweep.as_ref().map(resonance).transpose()?;
+    let shape = |path| mode_shape(&points(path, "position_m")?).map_err(refused(path));
+    let shape = args.map.as_ref().map(shape).transpose()?;
     let exponent = if args.linear_droop { Exponent::Linear } else { Exponent::Hertz };
-    let drooped = match &args.droop {
-        None => None,
-        Some(path) => Some(droop(&points(path, "normal_force_n")?, exponent).map_err(refused(path))?),
-    };
+    let drooped = |path| droop(&points(path, "normal_force_n")?, exponent).map_err(refused(path));
+    let drooped = args.droop.as_ref().map(drooped).transpose()?;
     let found = AmplitudeFit {
         gain,
         set_point_unit: unit.into(),
@@ -168,12 +162,8 @@ fn with_vibrometer(args: &Args) -> miette::Result<Setup> {
 /// Takes the table live and keeps it beside the certificate; its path, and the vibrometer's settings in words.
 fn live_table(args: &Args, bench: &dyn Bench) -> miette::Result<(PathBuf, String)> {
     let setup = with_vibrometer(args)?;
-    let table = LiveTable {
-        set_points_pp_m: &args.live,
-        frequency_hz: args.frequency_hz,
-        passes: args.passes,
-        settle_s: args.settle_s,
-    };
+    let &Args { ref live, frequency_hz, passes, settle_s, .. } = args;
+    let table = LiveTable { set_points_pp_m: live, frequency_hz, passes, settle_s };
     let text = bench.amplitudes(&setup, &table)?;
     let path = args.common.out.clone().unwrap_or_else(|| "amplitude.toml".into()).with_extension("csv");
     crate::files::write_whole(&path, &text)?;

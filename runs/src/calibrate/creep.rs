@@ -47,13 +47,9 @@ pub fn certified(args: &Args) -> miette::Result<Issued> {
         Finding::new("creep.relative", "1", found.relative, dof),
         Finding::new("creep.time_constant", "s", found.time_constant_s, dof),
     ];
-    let residuals = Residuals {
-        count: left.len() as u64,
-        sd: (left.iter().map(|r| r * r).sum::<f64>() / dof).sqrt(),
-        largest: left.iter().fold(0.0, |m, r| m.max(r.abs())),
-        unit: "counts".into(),
-        lack_of_fit_p: None,
-    };
+    let sd = (left.iter().map(|r| r * r).sum::<f64>() / dof).sqrt();
+    let (count, largest) = (left.len() as u64, left.iter().fold(0f64, |m, r| m.max(r.abs())));
+    let residuals = Residuals { count, sd, largest, unit: "counts".into(), lack_of_fit_p: None };
     let model = "counts(t) = c0 (1 + relative (1 - exp(-t / time_constant)))";
     args.common.certify(outcome(model, &findings, residuals, remarks), sources.raw_data())
 }

@@ -75,10 +75,8 @@ fn run(
         if time.windows(2).any(|w| w[1] <= w[0]) {
             miette::bail!("{shown}: event {number}: time_s must rise from row to row");
         }
-        events.push(
-            fit(&time, &value)
-                .map_err(|e| miette::miette!("{shown}: event {number}: no certificate: {e}"))?,
-        );
+        let refused = |e| miette::miette!("{shown}: event {number}: no certificate: {e}");
+        events.push(fit(&time, &value).map_err(refused)?);
     }
     let mut remarks = Vec::new();
     if events.len() == 2 {
@@ -97,18 +95,15 @@ fn run(
             [one] => Finding::new(*name, *unit, one.found[k], one.samples as f64 - 5.0),
             all => {
                 let values: Vec<f64> = all.iter().map(|e| e.found[k][0]).collect();
-                let mean = Input::type_a(name, &values);
+                let mean = Input::type_a(&values);
                 Finding::new(*name, *unit, [mean.value, mean.standard_uncertainty], mean.degrees_of_freedom)
             }
         })
         .collect();
     let n = events.len() as f64;
-    let residuals = Residuals {
-        count: events.iter().map(|e| e.samples as u64).sum(),
-        sd: (events.iter().map(|e| e.residual[0].powi(2)).sum::<f64>() / n).sqrt(),
-        largest: events.iter().map(|e| e.residual[1]).fold(0.0, f64::max),
-        unit: "as the values".into(),
-        lack_of_fit_p: None,
-    };
+    let count = events.iter().map(|e| e.samples as u64).sum();
+    let sd = (events.iter().map(|e| e.residual[0].powi(2)).sum::<f64>() / n).sqrt();
+    let largest = events.iter().map(|e| e.residual[1]).fold(0.0, f64::max);
+    let residuals = Residuals { count, sd, largest, unit: "as the values".into(), lack_of_fit_p: None };
     args.common.certify(outcome(model, &findings, residuals, remarks), sources.raw_data())
 }

@@ -1,12 +1,9 @@
 //! `muprime calibrate finger`.
 
-use super::inverse;
 use super::tables::{Sources, columns};
-use super::{Common, Issued};
-use calibration::finger::friction;
-use calibration::finger::springs;
+use super::{Common, Issued, inverse};
 use calibration::finger::stiffness::{Stiffness, UltrasonicPoint, quasi_static, ultrasonic};
-use calibration::finger::{FingerError, FingerFit};
+use calibration::finger::{FingerError, FingerFit, friction, springs};
 use calibration::phase::table::read_phases;
 use models::rig_file::PassNoise;
 use std::path::PathBuf;
@@ -133,11 +130,8 @@ pub fn certified(args: &Args) -> miette::Result<Issued> {
             inverse::analyse(&options, &points).map_err(|e| e.wrap_err(path.display().to_string()))?;
         (found.modulus, found.skin) = (Some(modulus), skin);
     }
-    if found.stiffness.is_empty()
-        && found.friction.is_none()
-        && found.modulus.is_none()
-        && found.springs.is_none()
-    {
+    let measured = !found.stiffness.is_empty() || found.friction.is_some();
+    if !measured && found.modulus.is_none() && found.springs.is_none() {
         miette::bail!(
             "nothing to calibrate: give a phase table, a loop, ultrasonic data, friction passes, or a run's passes"
         );

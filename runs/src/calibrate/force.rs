@@ -71,12 +71,8 @@ pub fn certified(args: &Args, bench: &dyn Bench) -> miette::Result<Issued> {
         None => {
             let beside = args.common.out.clone().unwrap_or_else(|| "force.toml".into()).with_extension("csv");
             let path = args.save_series.clone().unwrap_or(beside);
-            let options = SeriesOptions {
-                setup: args.setup.as_deref(),
-                average_s: args.average_s,
-                reconnect_s: args.reconnect_s,
-                keep: &path,
-            };
+            let (setup, &Args { average_s, reconnect_s, .. }) = (args.setup.as_deref(), args);
+            let options = SeriesOptions { setup, average_s, reconnect_s, keep: &path };
             let text = bench.series(&options)?;
             let name = path.display().to_string();
             say!("the series is in {name}");

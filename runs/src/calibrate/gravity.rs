@@ -32,13 +32,11 @@ pub fn certified(args: &Args) -> miette::Result<Issued> {
     })?;
     let dof = 2.0 * rows.len() as f64 - 4.0;
     let (angle, weight) = (found.angle_rad[0], found.weight_n[0]);
-    let largest = readings
-        .iter()
-        .flat_map(|r| {
-            let (s, c) = (r.tilt_rad + angle).sin_cos();
-            [r.force_n[0] - weight * s - found.offset_n[0], r.force_n[1] - weight * c - found.offset_n[1]]
-        })
-        .fold(0.0, |m: f64, r| m.max(r.abs()));
+    let left = |r: &TiltReading| {
+        let (s, c) = (r.tilt_rad + angle).sin_cos();
+        [r.force_n[0] - weight * s - found.offset_n[0], r.force_n[1] - weight * c - found.offset_n[1]]
+    };
+    let largest = readings.iter().flat_map(left).fold(0.0, |m: f64, r| m.max(r.abs()));
     let remarks = vec![format!(
         "offsets that gravity has no part in: lateral {:.5} N, normal {:.5} N",
         found.offset_n[0], found.offset_n[1]
@@ -47,13 +45,8 @@ pub fn certified(args: &Args) -> miette::Result<Issued> {
         Finding::new("orientation.angle", "rad", found.angle_rad, dof),
         Finding::new("orientation.weight", "N", found.weight_n, dof),
     ];
-    let residuals = Residuals {
-        count: 2 * rows.len() as u64,
-        sd: found.residual_sd_n,
-        largest,
-        unit: "N".into(),
-        lack_of_fit_p: None,
-    };
+    let (count, sd) = (2 * rows.len() as u64, found.residual_sd_n);
+    let residuals = Residuals { count, sd, largest, unit: "N".into(), lack_of_fit_p: None };
     let model = "F_lateral = W sin(tilt + angle) + o_lateral, F_normal = W cos(tilt + angle) + o_normal";
     args.common.certify(outcome(model, &findings, residuals, remarks), sources.raw_data())
 }

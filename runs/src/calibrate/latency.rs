@@ -33,13 +33,13 @@ pub fn certified(args: &Args) -> miette::Result<Issued> {
     let mut sources = Sources::default();
     let mut channels = Vec::new();
     let mut remarks = Vec::new();
+    let delay = |channel, delays: &[f64], given: &String| {
+        channel_delay(channel, delays, args.resolution_s).map_err(|e| miette::miette!("{given}: {e}"))
+    };
     for given in &args.edges {
         let (channel, path) = split(given)?;
         let delays: Vec<f64> = columns(&mut sources, &path, ["delay_s"], &[])?.iter().map(|r| r[0]).collect();
-        channels.push(
-            channel_delay(channel, &delays, args.resolution_s)
-                .map_err(|e| miette::miette!("{given}: {e}"))?,
-        );
+        channels.push(delay(channel, &delays, given)?);
     }
     for given in &args.steps {
         let (channel, path) = split(given)?;
@@ -52,10 +52,7 @@ pub fn certified(args: &Args) -> miette::Result<Issued> {
             delays.push(found.delay_s[0]);
             bandwidths.push(found.bandwidth_hz[0]);
         }
-        channels.push(
-            channel_delay(channel, &delays, args.resolution_s)
-                .map_err(|e| miette::miette!("{given}: {e}"))?,
-        );
+        channels.push(delay(channel, &delays, given)?);
         let n = bandwidths.len() as f64;
         let mean = bandwidths.iter().sum::<f64>() / n;
         let sd = (bandwidths.iter().map(|b| (b - mean).powi(2)).sum::<f64>() / (n - 1.0)).sqrt();

@@ -62,25 +62,15 @@ pub fn certified(args: &Args) -> miette::Result<Issued> {
             )
         };
         let mean = mean_with_uncertainty(&counts);
-        let independent = (n / integrated_autocorrelation_time(&counts)).max(2.0);
+        let dof = (n / integrated_autocorrelation_time(&counts)).max(2.0) - 1.0;
         let sd = (counts.iter().map(|c| (c - mean.0).powi(2)).sum::<f64>() / (n - 1.0)).sqrt();
         largest = counts.iter().fold(largest, |m, c| m.max((c - mean.0).abs()));
-        let level = spectrum.white_level();
+        let (level, n) = (spectrum.white_level(), spectrum.segments as f64);
         findings.extend([
-            Finding::new(format!("{name}.zero"), "counts", [mean.0, mean.1], independent - 1.0),
+            Finding::new(format!("{name}.zero"), "counts", [mean.0, mean.1], dof),
             // The relative uncertainty of a standard deviation is 1 / sqrt(2 (n - 1)) (GUM E.4.3).
-            Finding::new(
-                format!("{name}.noise_sd"),
-                "counts",
-                [sd, sd / (2.0 * (independent - 1.0)).sqrt()],
-                independent - 1.0,
-            ),
-            Finding::new(
-                format!("{name}.white_density"),
-                "counts^2/Hz",
-                [level, level / (spectrum.segments as f64).sqrt()],
-                spectrum.segments as f64,
-            ),
+            Finding::new(format!("{name}.noise_sd"), "counts", [sd, sd / (2.0 * dof).sqrt()], dof),
+            Finding::new(format!("{name}.white_density"), "counts^2/Hz", [level, level / n.sqrt()], n),
         ]);
         for line in spectrum.lines(6.0) {
             remarks

@@ -61,14 +61,9 @@ pub struct Args {
 
 /// Calibrates.
 pub fn certified(args: &Args, bench: &dyn Bench) -> miette::Result<Issued> {
-    let settings = match &args.setup {
-        None => None,
-        Some(name) => {
-            let settings = bench.vibrometer(&Setup::load(name)?, args.frequency_hz)?;
-            say!("vibrometer: {settings}");
-            Some(settings)
-        }
-    };
+    let settings = |name: &String| bench.vibrometer(&Setup::load(name)?, args.frequency_hz);
+    let settings = args.setup.as_ref().map(settings).transpose()?;
+    settings.iter().for_each(|settings| say!("vibrometer: {settings}"));
     let decoder = |name: &str, range: &Option<String>, delay: &Option<String>| {
         let (range_text, delay_text) =
             (range.as_deref().unwrap_or("125mm/s/V"), delay.as_deref().unwrap_or("0 us"));
@@ -89,18 +84,12 @@ pub fn certified(args: &Args, bench: &dyn Bench) -> miette::Result<Issued> {
         let rows = columns(&mut sources, path, ["plate_v", "skin_v"], &[])?;
         let (plate_v, skin_v): (Vec<f64>, Vec<f64>) = rows.iter().map(|r| (r[0], r[1])).unzip();
         let (rate_hz, frequency_hz) = (args.rate_hz, args.frequency_hz);
-        let waveforms = Waveforms {
-            plate_v: &plate_v,
-            skin_v: &skin_v,
-            rate_hz,
-            frequency_hz,
-            plate: &plate,
-            skin: &skin,
-        };
+        let (plate_v, skin_v) = (&plate_v[..], &skin_v[..]);
+        let waveforms = Waveforms { plate_v, skin_v, rate_hz, frequency_hz, plate: &plate, skin: &skin };
         let shown = path.display();
         let found = shift(&waveforms).map_err(|e| miette::miette!("{shown}: {e}"))?;
         let moved =
-            sine(&plate_v, rate_hz, frequency_hz, &plate).map_err(|e| miette::miette!("{shown}: {e}"))?;
+            sine(plate_v, rate_hz, frequency_hz, &plate).map_err(|e| miette::miette!("{shown}: {e}"))?;
         shifts.push((moved.amplitude().metres(), found));
     }
     shifts.sort_by(|a, b| a.0.total_cmp(&b.0));

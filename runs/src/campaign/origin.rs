@@ -28,10 +28,7 @@ fn stored(folder: &Path) -> miette::Result<Option<Origin>> {
 }
 
 /// The folder that the paths of a campaign's text are relative to, by the folder of its results; of a
-/// campaign that an earlier version made the same folder.
-///
-/// # Errors
-/// The folder with its plan and setups is gone.
+/// campaign that an earlier version made the same folder. An error: that folder is gone.
 pub(super) fn of_folder(folder: &Path) -> miette::Result<PathBuf> {
     let Some(origin) = stored(folder)? else { return Ok(folder.to_path_buf()) };
     miette::ensure!(

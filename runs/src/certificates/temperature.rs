@@ -40,12 +40,8 @@ impl TemperatureRange {
             Err(NoData::NotFitted) => return None,
             Err(reason) => (None, Some(*reason)),
         };
-        Some(TemperatureFlag {
-            certificate: self.certificate.clone(),
-            range_c: self.range_c,
-            found_c,
-            missing,
-        })
+        let TemperatureRange { certificate, range_c } = self.clone();
+        Some(TemperatureFlag { certificate, range_c, found_c, missing })
     }
 
     fn holds(&self, temperature_c: f64) -> bool {

@@ -34,12 +34,8 @@ impl Compared {
         let [facts_a, facts_b] = [record_facts(folders[0])?, record_facts(folders[1])?];
         let [noise_a, noise_b] = [noise(folders[0])?, noise(folders[1])?];
         let sides = [Side::of(&a, noise_a), Side::of(&b, noise_b)];
-        let bare: Vec<String> = folders
-            .iter()
-            .zip(&sides)
-            .filter(|(_, side)| side.reference().is_none())
-            .map(|(folder, _)| folder.display().to_string())
-            .collect();
+        let bare = folders.iter().zip(&sides).filter(|(_, side)| side.reference().is_none());
+        let bare: Vec<String> = bare.map(|(folder, _)| folder.display().to_string()).collect();
         let comparison = compare(&sides[0], &sides[1]).ok_or_else(|| {
             miette::miette!(
                 help = "mu' is friction over that without vibration: both runs need such passes",

@@ -5,7 +5,7 @@
 //! the stated noise makes of it where that is more. A group of one run has the stated noise alone, and its
 //! interval does not hold how far another run would lie.
 
-use super::{Reference, Side, folders::noise, same};
+use super::{Reference, Side, by_condition, folders::noise};
 use crate::report::RunData;
 use crate::run_dir::sessions_in;
 use calibration::certificate::date;
@@ -146,12 +146,8 @@ impl Grouped {
             let mu0 = of().map(|(run, _)| run.reference.mu0).collect();
             Group { name: name.clone(), runs: of().map(|(_, folder)| folder.clone()).collect(), mu0 }
         };
-        Ok(Grouped {
-            by,
-            groups: names.iter().map(group).collect(),
-            conditions,
-            warnings: warnings(&runs, folders),
-        })
+        let (groups, warnings) = (names.iter().map(group).collect(), warnings(&runs, folders));
+        Ok(Grouped { by, groups, conditions, warnings })
     }
 
     /// Later groups' differences whose interval leaves zero out, and all differences.
@@ -184,8 +180,7 @@ fn read(folder: &Path, by: GroupBy) -> miette::Result<Read> {
             "{}: the run has no pass without vibration",
             folder.display()
         )
-    });
-    let reference = reference?;
+    })?;
     let group = group_of(folder, &data, by).wrap_err_with(|| folder.display().to_string())?;
     Ok(Read { data, noise, group, reference })
 }
@@ -225,29 +220,16 @@ fn moisture(data: &RunData) -> String {
 }
 
 fn conditions(runs: &[Read], groups: &[String]) -> Vec<AtCondition> {
-    let mut found: Vec<(&Pass, Vec<Vec<&Pass>>)> = Vec::new();
     let sides: Vec<Side<'_>> = runs.iter().map(|run| Side::of(&run.data, run.noise)).collect();
-    for (i, side) in sides.iter().enumerate() {
-        for pass in side.vibrating() {
-            let at = found.iter().position(|(first, _)| same(first, pass)).unwrap_or_else(|| {
-                found.push((pass, vec![Vec::new(); runs.len()]));
-                found.len() - 1
-            });
-            found[at].1[i].push(pass);
-        }
-    }
+    let mut found = by_condition(&sides.iter().collect::<Vec<_>>());
     let at = |(first, passes): &(&Pass, Vec<Vec<&Pass>>)| {
         let of_group = |name: &String| {
-            let own: Vec<(f64, f64)> = runs
-                .iter()
-                .enumerate()
-                .filter(|(i, run)| run.group == *name && !passes[*i].is_empty())
-                .map(|(i, run)| {
-                    let mean = sides[i].mean(&passes[i], run.reference);
-                    (mean.mu_relative, mean.sd.hypot(mean.mu_relative * run.reference.relative_sd))
-                })
-                .collect();
-            group_mean(&own)
+            let has = |(i, run): &(usize, &Read)| run.group == *name && !passes[*i].is_empty();
+            let mean = |(i, run): (usize, &Read)| {
+                let mean = sides[i].mean(&passes[i], run.reference);
+                (mean.mu_relative, mean.sd.hypot(mean.mu_relative * run.reference.relative_sd))
+            };
+            group_mean(&runs.iter().enumerate().filter(has).map(mean).collect::<Vec<_>>())
         };
         let means: Vec<Option<GroupMean>> = groups.iter().map(of_group).collect();
         let differences = means[1..].iter().map(|mean| Some(difference(&means[0]?, &(*mean)?))).collect();

@@ -133,13 +133,8 @@ pub(super) fn of(
         let sd_s = (square / (n - 1.0)).sqrt();
         let cycle_s = known.map_or(0.0, |known| known.cycle_s);
         let slower = delay_s - known_s > (SURE * sd_s).max(RESOLVED_CYCLES * cycle_s);
-        (n > 1.0 && found.iter().all(|f| f.2)).then(|| Late {
-            part: name.into(),
-            delay_s,
-            sd_s,
-            known_s,
-            slower,
-        })
+        let late = Late { part: name.into(), delay_s, sd_s, known_s, slower };
+        (n > 1.0 && found.iter().all(|f| f.2)).then_some(late)
     };
     let parts = known.filter(|_| open).map_or_else(Vec::new, |known| {
         let [sensor, before] = [known.sensor_part_s(), known.delay_s() - known.sensor_part_s()];

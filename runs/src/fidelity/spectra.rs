@@ -145,14 +145,12 @@ pub(super) fn minus_3_db(bins: &[Bin]) -> Option<Corner> {
 
 fn fitted(bins: &[&Bin]) -> Option<Corner> {
     let scale = bins.last()?.hz.powi(2);
-    let rows: Vec<([f64; 3], f64, f64)> = bins
-        .iter()
-        .map(|b| {
-            let (u, y) = (b.hz.powi(2) / scale, b.gain.powi(-2));
-            let sd = 2.0 * (b.gain_sd / b.gain).max(1e-4) * y;
-            ([1.0, u, u * u], y, sd.powi(-2))
-        })
-        .collect();
+    let row = |b: &&Bin| {
+        let (u, y) = (b.hz.powi(2) / scale, b.gain.powi(-2));
+        let sd = 2.0 * (b.gain_sd / b.gain).max(1e-4) * y;
+        ([1.0, u, u * u], y, sd.powi(-2))
+    };
+    let rows: Vec<([f64; 3], f64, f64)> = bins.iter().map(row).collect();
     let (mut m, mut r) = ([[0.0; 3]; 3], [0.0; 3]);
     for (x, y, w) in &rows {
         for i in 0..3 {

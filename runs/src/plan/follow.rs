@@ -65,14 +65,8 @@ impl Plan {
             seen.push(c);
             let dynamics = known(c.frequency_hz);
             self.amplitudes(&demand, &c, law, limits, &mut wrong);
-            self.frequencies(
-                &demand,
-                &c,
-                &dynamics,
-                (render.depth, render.tolerance),
-                &mut wrong,
-                &mut remarks,
-            );
+            let shown = (render.depth, render.tolerance);
+            self.frequencies(&demand, &c, &dynamics, shown, &mut wrong, &mut remarks);
         }
         wrong.end()?;
         let limit = limits.amplitude_max;
@@ -96,8 +90,7 @@ impl Plan {
         wrong: &mut Problems<'_>,
     ) {
         let speed = quantity(c.speed_m_s, "m/s");
-        let place =
-            place_of(&self.text, &["render", "depth"]).or_else(|| place_of(&self.text, &["render", "file"]));
+        let place = ["depth", "file"].iter().find_map(|key| place_of(&self.text, &["render", key]));
         for wanted in demand.range {
             let found = quick(law, c, wanted, c.amplitude, None);
             let largest = quantity(c.amplitude.metres(), "m");
@@ -111,11 +104,10 @@ impl Plan {
                     let most = limits.amplitude_rate_max_m_s;
                     if wanted < 1.0 && rate > most {
                         let [rate, most] = [rate, most].map(|v| quantity(v, "m/s"));
-                        wrong.add_at(
-                            place.clone(),
-                            format!("at {speed} the amplitude must change by {rate}; the limit is {most}"),
-                            "render more slowly, more coarsely or less deeply".to_string(),
-                        );
+                        let problem =
+                            format!("at {speed} the amplitude must change by {rate}; the limit is {most}");
+                        let remedy = "render more slowly, more coarsely or less deeply".to_string();
+                        wrong.add_at(place.clone(), problem, remedy);
                     }
                     continue;
                 }
@@ -145,10 +137,7 @@ impl Plan {
         let (speed, period) = (quantity(c.speed_m_s, "m/s"), quantity(demand.period_m, "m"));
         let hz = c.speed_m_s / demand.period_m;
         let passes = format!("a period of {period} at {speed} is {} Hz", number(hz));
-        let place = || {
-            place_of(&self.text, &["render", "period_m"])
-                .or_else(|| place_of(&self.text, &["render", "target"]))
-        };
+        let place = || ["period_m", "target"].iter().find_map(|key| place_of(&self.text, &["render", key]));
         let remedy = || "slide more slowly, or render longer waves".to_string();
         let most = 1.0 / (CYCLES_MIN * dynamics.cycle_s);
         if hz > most {

@@ -11,6 +11,7 @@ use rand::seq::SliceRandom;
 use rand_chacha::ChaCha12Rng;
 use realtime::safety::{HARD, Limits};
 use serde::{Deserialize, Serialize};
+use std::ops::Range;
 
 /// One pass of a plan.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
@@ -42,28 +43,13 @@ pub struct Resolution {
     pub frequency_hz: f64,
 }
 
-impl Resolution {
-    fn amplitude(&self, wanted: f64) -> f64 {
-        quantise(wanted, self.amplitude_pp_m)
-    }
-
-    fn frequency(&self, wanted: f64) -> f64 {
-        quantise(wanted, self.frequency_hz)
-    }
-}
-
 /// Steps of the amplifier that an amplitude has at least: the loop looks for a fifth of it (SR-22), which is
 /// then one step.
 const STEPS_MIN: f64 = 5.0;
 
-fn quantise(wanted: f64, step: f64) -> f64 {
+fn quantised(wanted: f64, step: f64) -> f64 {
     if step > 0.0 { (wanted / step).round() * step } else { wanted }
 }
-
-/// Why a plan cannot be run on a rig.
-#[derive(Debug, thiserror::Error)]
-#[error("{0}")]
-pub struct PlanProblem(String);
 
 /// A condition of a series, and how it is visited.
 #[derive(Clone, Copy)]
@@ -114,8 +100,8 @@ impl Plan {
             }
         }
         let set = |c: Condition| Condition {
-            amplitude: PeakToPeak::from_metres(resolution.amplitude(c.amplitude.metres())),
-            frequency_hz: resolution.frequency(c.frequency_hz),
+            amplitude: PeakToPeak::from_metres(quantised(c.amplitude.metres(), resolution.amplitude_pp_m)),
+            frequency_hz: quantised(c.frequency_hz, resolution.frequency_hz),
             ..c
         };
         // A series' own directions are settings like others; the plan's are visited in turn.
@@ -148,10 +134,7 @@ impl Plan {
             }
         }
         // What leaves the air as it is comes before anything is set.
-        let sets = |s: &Ambient| {
-            [s.ambient_pressure_pa, s.temperature_c, s.relative_humidity_pct].map(|v| v.is_some())
-        };
-        states.sort_by_key(|(state, _)| sets(state).contains(&true));
+        states.sort_by_key(|(state, _)| *state != Ambient::default());
         let mut points = Vec::new();
         for state in states {
             let here = conditions.iter().filter(|v| state_of(v) == state);
@@ -189,6 +172,11 @@ impl Plan {
         speed_m_s * self.file.pass.sliding_s(edges, speed_m_s)[0] * 1.1 + 1e-3
     }
 
+    /// Where the values of a series stand: with it, or with the base.
+    fn setting(&self, index: usize, name: &str) -> Option<Range<usize>> {
+        series_place(&self.text, index, name).or_else(|| input::place_of(&self.text, &["base", name]))
+    }
+
     /// Tells of every value of a series that is outside what somebody allows.
     pub(super) fn check_series(
         &self,
@@ -201,24 +189,18 @@ impl Plan {
         for (covariate, list) in series.lists() {
             let name = covariate.name;
             let Some(([low, high], by)) = allows(covariate) else { continue };
-            let based = covariate.of(&base).filter(|_| list.is_empty()).map(|v| (false, v));
-            for (in_series, value) in list.iter().map(|v| (true, *v)).chain(based) {
+            let based = covariate.of(&base).filter(|_| list.is_empty());
+            for value in list.iter().copied().chain(based) {
                 if value.is_finite() && value >= low && value <= high {
                     continue;
                 }
-                let place = if in_series {
-                    series_place(&self.text, index, name)
-                } else {
-                    input::place_of(&self.text, &["base", name])
-                };
-                let remedy = unit_meant(name, value, [low, high]).unwrap_or_else(|| {
-                    match value <= 0.0 && low >= 0.0 {
-                        true if value < 0.0 => {
-                            format!("{name} is a magnitude: write it without the minus sign")
-                        }
-                        true => format!("give {name} a value above zero"),
-                        false => "change the plan, or the [limits] of the setup below the hard limits".into(),
+                let place = self.setting(index, name);
+                let remedy = unit_meant(name, value, [low, high]).unwrap_or_else(|| match value {
+                    v if v < 0.0 && low >= 0.0 => {
+                        format!("{name} is a magnitude: write it without the minus sign")
                     }
+                    0.0 if low >= 0.0 => format!("give {name} a value above zero"),
+                    _ => "change the plan, or the [limits] of the setup below the hard limits".into(),
                 });
                 let low = if low == f64::MIN_POSITIVE { 0.0 } else { low };
                 let [value, low, high] = [value, low, high].map(|v| quantity(v, input::unit_of(name)));
@@ -236,10 +218,7 @@ impl Plan {
         let least = STEPS_MIN * resolution.amplitude_pp_m;
         // 5e-9 is not below five times 1e-9, whatever the last digits say.
         for value in list.iter().copied().chain(based).filter(|w| *w > 0.0 && *w < least * (1.0 - 1e-9)) {
-            let place = match based {
-                None => series_place(&self.text, index, "amplitude_pp_m"),
-                Some(_) => input::place_of(&self.text, &["base", "amplitude_pp_m"]),
-            };
+            let place = self.setting(index, "amplitude_pp_m");
             let [value, step, least] = [value, resolution.amplitude_pp_m, least].map(|w| quantity(w, "m"));
             let problem = format!(
                 "amplitude_pp_m = {value} is too small for this rig: the amplifier sets steps of {step}, and of \
@@ -300,7 +279,7 @@ fn allowed(covariate: &Covariate, limits: &Limits) -> [f64; 2] {
 /// written in kPa, so that no value in kPa passes for one in Pa.
 const CHAMBER_PA: [f64; 2] = [200.0, 200_000.0];
 
-pub(crate) fn series_place(text: &str, index: usize, name: &str) -> Option<std::ops::Range<usize>> {
+pub(crate) fn series_place(text: &str, index: usize, name: &str) -> Option<Range<usize>> {
     let table = toml::de::DeTable::parse(text).ok()?;
     let series = table.get_ref().get("series")?.get_ref().as_array()?;
     series.get(index)?.get_ref().as_table()?.get(name).map(toml::Spanned::span)

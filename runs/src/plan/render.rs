@@ -2,9 +2,9 @@
 
 mod file;
 
-use super::Plan;
+use super::{Plan, Series};
 use crate::fidelity::dynamics::Dynamics;
-use crate::input::{BadInput, Problems};
+use crate::input::Problems;
 use models::target::{Feedback, MOST_DELAY, Target};
 use rand::{RngExt, SeedableRng};
 use rand_chacha::ChaCha12Rng;
@@ -125,30 +125,19 @@ impl RenderPlan {
         let generated = self.target != TargetKind::Table;
         let inside = self.mean - self.depth > 0.0 && self.mean + self.depth <= 1.0 && self.depth > 0.0;
         needs("depth", !generated || inside, "mean - depth must be above 0, mean + depth at most 1");
-        needs(
-            "tolerance",
-            self.tolerance > 0.0 && self.tolerance < 1.0,
-            "a number between 0 and 1 is needed",
-        );
+        let tolerance = self.tolerance > 0.0 && self.tolerance < 1.0;
+        needs("tolerance", tolerance, "a number between 0 and 1 is needed");
         needs("fall", (-2.0..=4.0).contains(&self.fall), "a number from -2 to 4 is needed");
-        let grating = self.target == TargetKind::Grating;
-        needs(
-            "period_m",
-            !grating || self.period_m.is_some_and(length),
-            "a grating needs a period of 10 \u{b5}m to 1 m",
-        );
+        let period = self.target != TargetKind::Grating || self.period_m.is_some_and(length);
+        needs("period_m", period, "a grating needs a period of 10 \u{b5}m to 1 m");
         let waves = self.waves_m.is_some_and(|[a, b]| length(a) && length(b) && a < b);
         let noise = self.target == TargetKind::Noise;
         needs("waves_m", !noise || waves, "noise needs the shortest and the longest wave, 10 \u{b5}m to 1 m");
         let gain = self.integral_per_s.is_none_or(|k| k.is_finite() && k > 0.0);
         needs("integral_per_s", gain, "a number above 0 is needed");
         let image = self.target == TargetKind::Image;
-        let filed = !image && self.target != TargetKind::Table;
-        needs(
-            "file",
-            filed || self.file.is_some(),
-            "a table needs the name of a CSV file, an image that of a PNG file",
-        );
+        let filed = !image && self.target != TargetKind::Table || self.file.is_some();
+        needs("file", filed, "a table needs the name of a CSV file, an image that of a PNG file");
         let pixel = self.pixel_m.is_some_and(|m| m.is_finite() && (1e-7..=1e-2).contains(&m));
         needs("pixel_m", !image || pixel, "an image needs the width of a pixel, 0.1 \u{b5}m to 10 mm");
         needs("lead_s", (0.0..=0.5).contains(&self.lead_s), "a time from 0 to 0.5 s is needed");
@@ -218,8 +207,7 @@ impl Plan {
                 "leave integral_per_s out, for {:.0} /s, or feedback, for open loop",
                 known.feedback(None).integral_per_s
             );
-            let place = crate::input::place_of(&self.text, &["render", "integral_per_s"]);
-            return Err(BadInput::new(&self.origin, &self.text, place, problem, remedy).into());
+            return Err(self.refused(&["render", "integral_per_s"], problem, remedy).into());
         }
         Ok(Some(gains))
     }
@@ -227,12 +215,8 @@ impl Plan {
     /// The stroke of the longest pass in m.
     fn longest_m(&self) -> f64 {
         let base = self.file.base.speed_m_s;
-        let speeds = self
-            .file
-            .series
-            .iter()
-            .flat_map(|s| if s.speed_m_s.is_empty() { vec![base] } else { s.speed_m_s.clone() });
-        speeds.map(|u| self.stroke_m(u, 0)).fold(0.0, f64::max)
+        let speeds = |s: &Series| if s.speed_m_s.is_empty() { vec![base] } else { s.speed_m_s.clone() };
+        self.file.series.iter().flat_map(speeds).map(|u| self.stroke_m(u, 0)).fold(0.0, f64::max)
     }
 
     /// The target of a plan that renders one.
@@ -250,8 +234,7 @@ impl Plan {
                 "the target covers {low:.1} to {high:.1} mm; the passes slide from {a:.1} to {b:.1} mm"
             );
             let remedy = "lengthen the target, or shorten [pass] measure_m and settle_s".to_string();
-            let place = crate::input::place_of(&self.text, &["render", "file"]);
-            return Err(BadInput::new(&self.origin, &self.text, place, problem, remedy).into());
+            return Err(self.refused(&["render", "file"], problem, remedy).into());
         }
         Ok(Some(Target { feedback, ..target }))
     }

@@ -1,7 +1,7 @@
 //! Whether the force sensor can see what a sweep is to show. A sweep whose whole expected change of force is
 //! a count or two, or drowns in the sensor's noise, measures the sensor: it is refused before anything moves.
 
-use super::points::series_place;
+use super::points::{Visit, series_place};
 use super::{Plan, Point, Resolution};
 use crate::input::BadInput;
 use crate::report::human::quantity;
@@ -29,16 +29,12 @@ pub struct LateralChannel {
 impl LateralChannel {
     /// The smallest change in N that a sweep may be made for, and what sets it.
     fn least_change_n(&self) -> (f64, String) {
-        let mut bounds =
-            vec![(self.pass_sd_n, format!("the setup's force_sd_n of a pass is {} mN", mn(self.pass_sd_n)))];
-        if let Some(count) = self.count_n {
-            let text = format!("its count is {} mN, and {COUNTS_MIN} of them are needed", mn(count));
-            bounds.push((COUNTS_MIN * count, text));
-        }
-        if let Some(noise) = self.noise_n {
-            bounds.push((noise, format!("its noise is {} mN", mn(noise))));
-        }
-        bounds.into_iter().max_by(|a, b| a.0.total_cmp(&b.0)).expect("the setup always states one")
+        let pass = format!("the setup's force_sd_n of a pass is {} mN", mn(self.pass_sd_n));
+        let count = |n| format!("its count is {} mN, and {COUNTS_MIN} of them are needed", mn(n));
+        let count = self.count_n.map(|n| (COUNTS_MIN * n, count(n)));
+        let noise = self.noise_n.map(|n| (n, format!("its noise is {} mN", mn(n))));
+        let larger = |a: (f64, String), b: (f64, String)| if b.0.total_cmp(&a.0).is_ge() { b } else { a };
+        count.into_iter().chain(noise).fold((self.pass_sd_n, pass), larger)
     }
 }
 
@@ -68,23 +64,17 @@ impl Plan {
         let (least_n, because) = channel.least_change_n();
         for (index, series) in self.file.series.iter().enumerate() {
             let conditions = self.conditions_of(index, resolution);
-            let expected = conditions
-                .iter()
-                .filter_map(|v| Some((v.condition, expected_change_n(&v.condition, model, mu0)?)));
+            let change = |v: &Visit<'_>| Some((v.condition, expected_change_n(&v.condition, model, mu0)?));
+            let expected = conditions.iter().filter_map(change);
             let Some((best, change_n)) = expected.max_by(|a, b| a.1.total_cmp(&b.1)) else { continue };
             if change_n >= least_n {
                 continue;
             }
-            let number = points
-                .iter()
-                .find(|p| p.condition == Condition { direction: p.condition.direction, ..best })
-                .map_or(String::new(), |p| format!(" (point {})", p.number));
-            let [w, f, u, n] = [
-                quantity(best.amplitude.metres(), "m"),
-                quantity(best.frequency_hz, "Hz"),
-                quantity(best.speed_m_s, "m/s"),
-                quantity(best.normal_force_n, "N"),
-            ];
+            let is_best = |p: &&Point| p.condition == Condition { direction: p.condition.direction, ..best };
+            let number =
+                points.iter().find(is_best).map_or(String::new(), |p| format!(" (point {})", p.number));
+            let [w, f] = [quantity(best.amplitude.metres(), "m"), quantity(best.frequency_hz, "Hz")];
+            let [u, n] = [quantity(best.speed_m_s, "m/s"), quantity(best.normal_force_n, "N")];
             let problem = format!(
                 "series '{}': the largest change of lateral force that {} expects is {} mN, at w = {w}, f = {f}, \
                  U = {u}, Fn = {n}{number}; {} sees no less than {} mN: {because}",

@@ -97,33 +97,19 @@ pub fn of_run(
 
 /// What a rig file states: the finger, the repeatability, the certificates.
 pub fn of_rig(rig: &RigFile) -> Vec<(&'static str, String)> {
-    let finger = &rig.finger;
-    let certificates: Vec<String> = rig.calibration.certificates.values().cloned().collect();
+    let (finger, noise) = (&rig.finger, &rig.noise);
+    let [normal, lateral] = [finger.normal_stiffness_n_per_m, finger.lateral_stiffness_n_per_m];
+    let [normal, lateral] = [normal, lateral].map(|stiffness| quantity(stiffness, "N/m"));
+    let within = 100.0 * finger.stiffness_relative_sd;
+    let (share, force_mn) = (100.0 * noise.pass_relative_sd, 1e3 * noise.force_sd_n);
+    let files: Vec<String> = rig.calibration.certificates.values().cloned().collect();
+    let none = files.is_empty().then(|| "none: scales as the instruments have them".to_string());
     vec![
         (
             "stiffness",
-            format!(
-                "normal {}, lateral {}, each within {:.0} % (standard uncertainty)",
-                quantity(finger.normal_stiffness_n_per_m, "N/m"),
-                quantity(finger.lateral_stiffness_n_per_m, "N/m"),
-                100.0 * finger.stiffness_relative_sd
-            ),
+            format!("normal {normal}, lateral {lateral}, each within {within:.0} % (standard uncertainty)"),
         ),
-        (
-            "repeatability",
-            format!(
-                "{:.1} % of the force and {:.2} mN, as stated",
-                100.0 * rig.noise.pass_relative_sd,
-                1e3 * rig.noise.force_sd_n
-            ),
-        ),
-        (
-            "certificates",
-            if certificates.is_empty() {
-                "none: scales as the instruments have them".into()
-            } else {
-                certificates.join(", ")
-            },
-        ),
+        ("repeatability", format!("{share:.1} % of the force and {force_mn:.2} mN, as stated")),
+        ("certificates", none.unwrap_or_else(|| files.join(", "))),
     ]
 }

@@ -1,7 +1,8 @@
 //! The page of two runs side by side.
 
-use super::html::{column, columns, escape, glossary, list, note, shell, table};
+use super::html::{cell, column, columns, escape, glossary, list, note, numeric, row, shell, table};
 use super::plots;
+use crate::compare::differences::Difference;
 use crate::compare::{Answer, Compared, Comparison, Mean, Paired};
 use std::fmt::Write;
 use std::path::Path;
@@ -22,7 +23,8 @@ pub fn page(compared: &Compared) -> miette::Result<String> {
             "<div class=\"verdict undecided\"><p>Cannot tell: the runs have no condition in common.</p></div>",
         ),
         Some(judged) => {
-            let [first, second] = judged.figures_words(&result.pairs);
+            let answer = escape(&judged.answer_words(conditions));
+            let [first, second] = judged.figures_words(&result.pairs).map(|words| escape(&words));
             let class = match judged.answer {
                 Answer::Differ => " departed",
                 Answer::NoDifferenceSeen => "",
@@ -30,10 +32,7 @@ pub fn page(compared: &Compared) -> miette::Result<String> {
             };
             let _ = write!(
                 w,
-                "<div class=\"verdict{class}\"><p><strong>{}</strong></p><p>{}<br>{}</p></div>",
-                escape(&judged.answer_words(conditions)),
-                escape(&first),
-                escape(&second)
+                "<div class=\"verdict{class}\"><p><strong>{answer}</strong></p><p>{first}<br>{second}</p></div>"
             );
         }
     }
@@ -68,18 +67,15 @@ fn about(compared: &Compared, a: &str, b: &str) -> String {
         let found: Vec<String> = side.iter().filter(|(n, _)| *n == name).map(|(_, v)| escape(v)).collect();
         if found.is_empty() { "none".into() } else { found.join("<br>") }
     };
-    let rows: String = names
-        .into_iter()
-        .map(|name| {
-            let cells = match (all(first, name), all(second, name)) {
-                (a, b) if a == b => format!("<td colspan=\"2\">{a}</td>"),
-                (a, b) => format!("<td>{a}</td><td>{b}</td>"),
-            };
-            format!("<tr><th scope=\"row\">{}</th>{cells}</tr>\n", escape(name))
-        })
-        .collect();
+    let row = |name: &str| {
+        let cells = match (all(first, name), all(second, name)) {
+            (a, b) if a == b => format!("<td colspan=\"2\">{a}</td>"),
+            (a, b) => cell(a) + &cell(b),
+        };
+        row(escape(name), [cells]) + "\n"
+    };
     let head = ["of the run", a, b].map(column).concat();
-    table("Both runs", &head, &rows)
+    table("Both runs", &head, names.into_iter().map(row))
 }
 
 /// Deviations from which a row stands out.
@@ -96,28 +92,25 @@ fn pairs(result: &Comparison) -> String {
     let row = |p: &&Paired| {
         let out = if p.deviations().abs() > STANDS_OUT { " class=\"out\"" } else { "" };
         let speed = p.speed_m_s * f64::from(p.direction) * 1e3;
-        format!(
-            "<tr{out}><td class=\"n\">{:.3}</td><td class=\"n\">{:.2}</td><td class=\"n\">{speed:+.1}</td><td class=\"n\">{:.2}</td>\
-             <td class=\"n\">{}</td><td class=\"n\">{}</td><td class=\"n\">{:+.3} &plusmn; {:.3}</td>\
-             <td class=\"n\">{:+.1}</td></tr>\n",
-            p.amplitude_pp_m * 1e6,
-            p.frequency_hz / 1e3,
-            p.normal_force_n,
+        let numbers = [
+            format!("{:.3}", p.amplitude_pp_m * 1e6),
+            format!("{:.2}", p.frequency_hz / 1e3),
+            format!("{speed:+.1}"),
+            format!("{:.2}", p.normal_force_n),
             mean(&p.a),
             mean(&p.b),
-            p.difference,
-            p.difference_sd,
-            p.deviations()
-        )
+            format!("{:+.3} &plusmn; {:.3}", p.difference, p.difference_sd),
+            format!("{:+.1}", p.deviations()),
+        ];
+        format!("<tr{out}>{}</tr>\n", numbers.map(numeric).concat())
     };
-    let rows: String = result.furthest_first().iter().map(row).collect();
     let passes = if single { "" } else { " In brackets: passes." };
     format!(
         "<h2>Condition by condition</h2>{}{}",
         note(&format!(
             "The largest differences come first; those above {STANDS_OUT} standard deviations are bold.{passes}"
         )),
-        table("Conditions in common", &head, &rows)
+        table("Conditions in common", &head, result.furthest_first().iter().map(row))
     )
 }
 
@@ -125,19 +118,9 @@ fn differences(compared: &Compared) -> String {
     if compared.differences.is_empty() {
         return "<h2>What differed</h2><p>Nothing that the records hold.</p>".into();
     }
-    let value = |v: &Option<String>| escape(v.as_deref().unwrap_or("none"));
-    let rows: String = compared
-        .differences
-        .iter()
-        .map(|d| {
-            format!(
-                "<tr><th scope=\"row\">{}</th><td>{}</td><td>{}</td></tr>\n",
-                escape(&d.what),
-                value(&d.a),
-                value(&d.b)
-            )
-        })
-        .collect();
+    let value = |v: &Option<String>| cell(escape(v.as_deref().unwrap_or("none")));
+    let row = |d: &Difference| row(escape(&d.what), [&d.a, &d.b].map(value)) + "\n";
     let head = columns("what|first run|second run");
-    format!("<h2>What differed</h2>{}", table("What differed", &head, &rows))
+    let rows = compared.differences.iter().map(row);
+    format!("<h2>What differed</h2>{}", table("What differed", &head, rows))
 }

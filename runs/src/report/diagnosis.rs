@@ -10,16 +10,17 @@ mod overlay;
 mod passes;
 mod timing;
 
-use super::html::{bar, columns, escape, glossary, head, list, note, shell, table};
+use super::html::{bar, cell, columns, escape, glossary, head, list, note, numeric, row, shell, table};
 use super::human::number;
-use super::plots::beyond;
 use super::plots::verdict::{Seen, errors_against};
-use crate::verdict::{listed, looks_like, plain};
+use super::plots::{beyond, ends};
+use crate::verdict::{listed, looks_like, name, plain};
 use diagnosis::Verdict;
 use diagnosis::data::Table;
 use diagnosis::describe::probability;
 use diagnosis::left_out::Errors;
 use diagnosis::predict::Forecast;
+use diagnosis::scatter::Suspect;
 use diagnosis::verdict::Diagnosis;
 use miette::IntoDiagnostic;
 use models::covariate;
@@ -75,17 +76,10 @@ fn how_far(result: &Diagnosis) -> String {
         ("repeatability", g.noise_floor_rmse),
     ];
     let largest = stages.iter().filter_map(|(_, v)| *v).fold(1e-12, f64::max);
-    let rows: String = stages
-        .iter()
-        .filter_map(|(name, value)| Some((name, (*value)?)))
-        .map(|(name, value)| {
-            format!(
-                "<tr><th scope=\"row\">{name}</th><td class=\"n\">{}</td><td>{}</td></tr>",
-                number(value),
-                bar(260.0 * value / largest)
-            )
-        })
-        .collect();
+    let row = |(name, value): (&str, Option<f64>)| {
+        let value = value?;
+        Some(row(name, [numeric(number(value)), cell(bar(260.0 * value / largest))]))
+    };
     let words = match g.change() {
         Some((verb, percent, Some([low, high]))) => {
             format!("The removable gap {verb} by {percent:.0} % (95 % interval {low:.0} to {high:.0} %).")
@@ -97,7 +91,7 @@ fn how_far(result: &Diagnosis) -> String {
     let head = columns("left by|#error|");
     format!(
         "<h2>How far the gap shrinks</h2><p>{words}</p>{}{}",
-        table("Errors on held-out passes", &head, &rows),
+        table("Errors on held-out passes", &head, stages.into_iter().filter_map(row)),
         note("Root mean square error on held-out passes, in units of full friction \u{3bc}0 Fn.")
     )
 }
@@ -106,13 +100,8 @@ fn location(result: &Diagnosis, table: &Table, errors: &[(f64, f64)]) -> String 
     let r = &result.report;
     let (listed, rest) = listed(&r.location.regions, LISTED_REGIONS);
     let more = rest.map_or_else(String::new, |rest| note(&format!("{rest} (in the JSON document).")));
-    let places: Vec<String> = r
-        .location
-        .place
-        .iter()
-        .filter(|(_, p)| **p >= 0.005)
-        .map(|(place, p)| format!("{place} {}", probability(*p)))
-        .collect();
+    let likely = r.location.place.iter().filter(|(_, p)| **p >= 0.005);
+    let places: Vec<String> = likely.map(|(place, p)| format!("{place} {}", probability(*p))).collect();
     // Errors with their passes: a share of the gap would be without an interval.
     let left = |e: &Errors| {
         let [before, after] = [e.recalibrated, e.after].map(|square| number(square.sqrt()));
@@ -137,28 +126,17 @@ fn uncertain(result: &Diagnosis) -> String {
     let r = &result.report;
     let mut text = String::from("<h2>What is uncertain</h2>");
     if !r.scatter.suspects.is_empty() {
-        let rows: String = r
-            .scatter
-            .suspects
-            .iter()
-            .map(|s| {
-                format!(
-                    "<tr><th scope=\"row\">{}</th><td class=\"n\">{} mN</td><td class=\"n\">{:+.1}</td><td class=\"n\">{}</td></tr>",
-                    s.point,
-                    number(1e3 * s.residual_n),
-                    s.deviations,
-                    probability(s.probability)
-                )
-            })
-            .collect();
+        let row = |s: &Suspect| {
+            let off_by = number(1e3 * s.residual_n) + " mN";
+            row(s.point, [off_by, format!("{:+.1}", s.deviations), probability(s.probability)].map(numeric))
+        };
         let head = columns("point|#off by|#deviations|#probability not to belong");
-        text += &format!("<h3>Suspect passes</h3>{}", table("Suspect passes", &head, &rows));
+        let rows = r.scatter.suspects.iter().map(row);
+        text += &format!("<h3>Suspect passes</h3>{}", table("Suspect passes", &head, rows));
         if let Some(with) = &r.with_suspects {
-            let name =
-                if with.effects.is_empty() { "no gap".into() } else { plain(&with.effects.join(" + ")) };
             text += &format!(
                 "<p>With them counted as any other the leading answer is {} (probability {}).</p>",
-                escape(&name),
+                escape(&name(&with.effects)),
                 probability(with.probability)
             );
         }
@@ -177,31 +155,23 @@ fn uncertain(result: &Diagnosis) -> String {
 fn residuals(result: &Diagnosis, table: &Table, forecasts: &[Forecast]) -> miette::Result<String> {
     let problem = &result.fitted.problem;
     let suspects: Vec<usize> = result.report.scatter.suspects.iter().map(|s| s.row).collect();
-    let z: Vec<(f64, f64)> = forecasts
-        .iter()
-        .enumerate()
-        .map(|(i, f)| {
-            let sd = (problem.whole_variance(i) / result.fitted.scatter.inflation[i]).sqrt();
-            let d = table.passes[i].direction.sign();
-            (d * (table.lateral[i] - f.recalibrated) / sd, d * (table.lateral[i] - f.corrected) / sd)
-        })
-        .collect();
+    let z = |(i, f): (usize, &Forecast)| {
+        let sd = (problem.whole_variance(i) / result.fitted.scatter.inflation[i]).sqrt();
+        let d = table.passes[i].direction.sign();
+        (d * (table.lateral[i] - f.recalibrated) / sd, d * (table.lateral[i] - f.corrected) / sd)
+    };
+    let z: Vec<(f64, f64)> = forecasts.iter().enumerate().map(z).collect();
     let limit = z.iter().fold(4.0f64, |a, (b, _)| a.max(b.abs())).min(40.0);
     let mut figures = String::new();
     for c in covariate::COVARIATES {
         let all: Option<Vec<f64>> = table.passes.iter().map(|p| c.of(p).map(|v| c.shown.0 * v)).collect();
         let Some(x) = all else { continue };
-        let (low, high) =
-            x.iter().fold((f64::INFINITY, f64::NEG_INFINITY), |(a, b), v| (a.min(*v), b.max(*v)));
+        let (low, high) = ends(x.iter().copied());
         if high - low <= 1e-12 * high.abs().max(1e-12) {
             continue;
         }
-        let points: Vec<Seen> = x
-            .iter()
-            .zip(&z)
-            .enumerate()
-            .map(|(i, (x, z))| Seen { x: *x, before: z.0, after: z.1, suspect: suspects.contains(&i) })
-            .collect();
+        let seen = |i: usize| Seen { x: x[i], before: z[i].0, after: z[i].1, suspect: suspects.contains(&i) };
+        let points: Vec<Seen> = (0..x.len()).map(seen).collect();
         figures += &errors_against(c, limit, &points)?;
     }
     let cut = beyond(z.iter().flat_map(|(before, after)| [*before, *after]), [-limit, limit]);

@@ -11,43 +11,44 @@ pub fn describe(event: &Event) -> String {
     match event {
         Event::Armed => "safety checks passed; drive enabled".into(),
         Event::NoSecondChannel => {
-            "warning: there is only one way to switch off. If the amplifier ignores 'off', cut its mains by hand; fit a supply relay \
-             ([supply_relay])"
-            .into()
+            "warning: there is only one way to switch off. If the amplifier ignores 'off', cut its mains by \
+             hand; fit a supply relay ([supply_relay])"
+                .into()
         }
-        Event::NoWatchdog => "warning: if this program dies the output stays on: neither the amplifier nor its supply has a watchdog. \
-             Keep a hand at the mains switch, or fit a relay with a heartbeat (wago-750-watchdog)"
-            .into(),
+        Event::NoWatchdog => {
+            "warning: if this program dies the output stays on: neither the amplifier nor its \
+             supply has a watchdog. Keep a hand at the mains switch, or fit a relay with a heartbeat \
+             (wago-750-watchdog)"
+                .into()
+        }
         Event::ExposureLeft(left) => format!(
             "exposure left for the finger: {:.0} s of this hour, a dose of {:.1} m2/s, {:.0} s without a rest",
             left.hour_s, left.dose_m2_s, left.in_one_go_s
         ),
         Event::NobodyTouches => format!("warning: {}", crate::setup::NOBODY),
-        Event::NotWired { contacts } => {
-            format!(
-                "warning: not monitored, because the setup says that no device is connected: {}",
-                contacts.join(", ")
-            )
-        }
+        Event::NotWired { contacts } => format!(
+            "warning: not monitored, because the setup says that no device is connected: {}",
+            contacts.join(", ")
+        ),
         Event::ArmingDisturbed { cause, held_up } => {
             let what = match cause {
-                Cause::EmergencyStop => {
-                    "the emergency stop did not report, so the supply was cut".into()
-                }
+                Cause::EmergencyStop => "the emergency stop did not report, so the supply was cut".into(),
                 cause => format!("the test of the supply relay was interrupted ({})", cause.words()),
             };
             let why = match held_up.seconds() * 1e3 {
                 ms if ms < 1.0 => String::new(),
                 ms => format!("; the loop was held up for {ms:.0} ms"),
             };
-            format!(
-                "before arming {what}{why}: nothing was driven; the supply relay is tested again"
-            )
+            format!("before arming {what}{why}: nothing was driven; the supply relay is tested again")
         }
         Event::Zeros { lateral_n, normal_n, after } => {
             let mn = |v: &Option<f64>| v.map_or("none".into(), |v| format!("{:+.2} mN", v * 1e3));
             let when = if *after { "after" } else { "before" };
-            format!("force offset {when} the sweep, unloaded: lateral {}, normal {}", mn(lateral_n), mn(normal_n))
+            format!(
+                "force offset {when} the sweep, unloaded: lateral {}, normal {}",
+                mn(lateral_n),
+                mn(normal_n)
+            )
         }
         Event::Tripped(trip) if trip.cause == Cause::Stopped => {
             "stopped on request: drive off, stage at rest, finger lifted".into()
@@ -59,16 +60,16 @@ pub fn describe(event: &Event) -> String {
         }
         Event::StopRequested => "stopping: the rig is made safe first".into(),
         Event::Paused { point } => format!("paused before pass {point}: drive off, lifted off, not armed"),
-        Event::PauseTooLong { bound } => format!("the pause was longer than {bound:.0} s (pause_max_s): the run ends"),
-        Event::PauseNotQuiet { cause } => {
-            format!(
-                "the rig was not off and at rest although it was disarmed ({}): the run ends\n  {}",
-                cause.words(),
-                cause.remedy()
-            )
+        Event::PauseTooLong { bound } => {
+            format!("the pause was longer than {bound:.0} s (pause_max_s): the run ends")
         }
-        Event::Resumed => "warning: resuming: the rig is armed again, then stage and plate move. Keep hands off; with a finger, \
-             release the dead-man device and grip it again"
+        Event::PauseNotQuiet { cause } => format!(
+            "the rig was not off and at rest although it was disarmed ({}): the run ends\n  {}",
+            cause.words(),
+            cause.remedy()
+        ),
+        Event::Resumed => "warning: resuming: the rig is armed again, then stage and plate move. Keep hands \
+             off; with a finger, release the dead-man device and grip it again"
             .into(),
         Event::PassRepeated { point } => format!("pass {point}: no contact; repeating it"),
         Event::TemperatureBeyondCertificate { point, flag } => {
@@ -109,22 +110,19 @@ fn at_rig(event: &Event) -> String {
         Event::Answered { step, answer, answered_by, .. } => format!("{step}: {answer} ({answered_by})"),
         Event::Waited { step, waited_s } => format!("{step}: waited {waited_s:.0} s"),
         Event::LevelSet { quantity, wanted } => format!("set: {}", of(quantity, *wanted)),
-        Event::LevelReached { quantity, wanted, found, source, after_s } => format!(
-            "{} reached after {after_s:.1} s: {} ({source})",
-            of(quantity, *wanted),
-            of(quantity, *found)
-        ),
+        Event::LevelReached { quantity, wanted, found, source, after_s } => {
+            let [wanted, found] = [wanted, found].map(|value| of(quantity, *value));
+            format!("{wanted} reached after {after_s:.1} s: {found} ({source})")
+        }
         Event::LevelNotReached { quantity, wanted, last } => format!(
             "{} was not reached: {}",
             of(quantity, *wanted),
             last.map_or_else(|| "nothing was read".into(), |last| format!("last {}", of(quantity, last)))
         ),
-        Event::LevelLost { point, quantity, wanted, range: [low, high] } => format!(
-            "point {point}: {} was lost, {} to {}; the pass is marked",
-            of(quantity, *wanted),
-            of(quantity, *low),
-            of(quantity, *high)
-        ),
+        Event::LevelLost { point, quantity, wanted, range: [low, high] } => {
+            let [wanted, low, high] = [wanted, low, high].map(|value| of(quantity, *value));
+            format!("point {point}: {wanted} was lost, {low} to {high}; the pass is marked")
+        }
         _ => String::new(),
     }
 }
@@ -143,8 +141,7 @@ pub(super) fn section(events: &[(f64, serde_json::Value)]) -> String {
         let words = escape(&words).replace('\n', "<br>");
         format!("<tr><td class=\"n\">{at:.3}</td><td>{words}</td></tr>\n")
     };
-    let rows: String = events.iter().map(row).collect();
-    format!("<h2>Events</h2>{}", table("Events", &columns("#time, s|event"), &rows))
+    format!("<h2>Events</h2>{}", table("Events", &columns("#time, s|event"), events.iter().map(row)))
 }
 
 /// A document as `key value` pairs, its numbers with three digits.

@@ -3,7 +3,9 @@
 
 use super::RunData;
 use super::events::describe;
+use super::human::rounded;
 use super::traces::Trace;
+use crate::sequence::MeasuredPass;
 use crate::session::{REPLAYABLE, Replayable};
 use models::quantity::PeakToPeak;
 
@@ -21,57 +23,55 @@ pub(super) fn section(run: &RunData, traces: &[Trace]) -> String {
     if run.passes.is_empty() {
         return String::new();
     }
-    // No markup can begin within the data.
-    let data = data(run, traces).to_string().replace('<', "\\u003c");
+    place(&data(run, traces).to_string()) + &script("explore")
+}
+
+/// Where the script works, hidden until then, and its data: no markup can begin within them.
+pub(super) fn place(data: &str) -> String {
     format!(
-        "<section id=\"explore\" hidden></section>\
-         <script type=\"application/json\" id=\"run-data\">{data}</script>\n{}",
-        script(
-            "explore(document.getElementById(\"explore\"), JSON.parse(document.getElementById(\"run-data\").textContent), document);"
-        )
+        "<section id=\"explore\" hidden></section><script type=\"application/json\" id=\"run-data\">{}</script>\n",
+        data.replace('<', "\\u003c")
     )
 }
 
-/// The library with its style, the figures and what is done with them, in the page itself: one that is opened
-/// as a file can import no module.
-pub(super) fn script(then: &str) -> String {
+/// The library with its style, the figures and the function that is called with place and data, in the page
+/// itself: one that is opened as a file can import no module.
+pub(super) fn script(function: &str) -> String {
     let imported = EXPLORE.split_once('\n').map_or("", |(_, rest)| rest);
     let figures = format!("{FIGURES}\n{imported}").replace("\nexport ", "\n");
     format!(
-        "<style>{UPLOT_STYLE}</style><script>{UPLOT}\ndocument.addEventListener(\"DOMContentLoaded\", () => {{\n{figures}\n{then}\n}});</script>\n"
+        "<style>{UPLOT_STYLE}</style><script>{UPLOT}\ndocument.addEventListener(\"DOMContentLoaded\", () => {{\n{figures}\n\
+         {function}(document.getElementById(\"explore\"), JSON.parse(document.getElementById(\"run-data\").textContent), \
+         document);\n}});</script>\n"
     )
 }
 
 fn data(run: &RunData, traces: &[Trace]) -> serde_json::Value {
-    let passes: Vec<_> = run
-        .passes
-        .iter()
-        .map(|p| {
-            let (c, pass) = (p.comparison, &p.pass);
-            let friction = pass.friction_force_n();
-            let still = pass.amplitude == PeakToPeak::ZERO;
-            let [mu, mu_sd] = [c.and_then(|c| c.mu_relative), c.and_then(|c| c.mu_relative_sd)].map(short);
-            let [time, w, f, u, normal] = [
-                pass.time_s,
-                pass.amplitude.micrometres(),
-                pass.frequency_hz / 1e3,
-                pass.speed_m_s * 1e3,
-                pass.normal_force_n,
-            ]
-            .map(|v| short(Some(v)));
-            serde_json::json!({
-                "point": pass.point, "time_s": time, "w_um": w, "f_khz": f, "u_mm_s": u, "direction": i8::from(pass.direction),
-                "normal_n": normal, "lateral_n": short(pass.lateral_force_n), "psi": short(p.psi_eq17), "mu": mu, "mu_sd": mu_sd,
-                "predicted": short(c.map(|c| c.predicted)), "predicted_sd": short(c.map(|c| c.predicted_sd)),
-                "surprise": short(c.map(|c| c.z)), "mu0": short(friction.filter(|_| still).map(|f| f / pass.normal_force_n)),
-            })
+    let pass = |p: &MeasuredPass| {
+        let (c, pass) = (p.comparison, &p.pass);
+        let friction = pass.friction_force_n();
+        let still = pass.amplitude == PeakToPeak::ZERO;
+        let [mu, mu_sd] = [c.and_then(|c| c.mu_relative), c.and_then(|c| c.mu_relative_sd)].map(short);
+        let [time, w, f, u, normal] = [
+            pass.time_s,
+            pass.amplitude.micrometres(),
+            pass.frequency_hz / 1e3,
+            pass.speed_m_s * 1e3,
+            pass.normal_force_n,
+        ]
+        .map(|v| short(Some(v)));
+        serde_json::json!({
+            "point": pass.point, "time_s": time, "w_um": w, "f_khz": f, "u_mm_s": u, "direction": i8::from(pass.direction),
+            "normal_n": normal, "lateral_n": short(pass.lateral_force_n), "psi": short(p.psi_eq17), "mu": mu, "mu_sd": mu_sd,
+            "predicted": short(c.map(|c| c.predicted)), "predicted_sd": short(c.map(|c| c.predicted_sd)),
+            "surprise": short(c.map(|c| c.z)), "mu0": short(friction.filter(|_| still).map(|f| f / pass.normal_force_n)),
         })
-        .collect();
-    let events: Vec<_> = run
-        .events
-        .iter()
-        .filter_map(|(at_s, event)| Some((at_s, describe(&serde_json::from_value(event.clone()).ok()?))))
-        .collect();
+    };
+    let passes: Vec<_> = run.passes.iter().map(pass).collect();
+    let event = |(at_s, event): &(f64, serde_json::Value)| {
+        Some((*at_s, describe(&serde_json::from_value(event.clone()).ok()?)))
+    };
+    let events: Vec<_> = run.events.iter().filter_map(event).collect();
     // The limits that the run had. The setup's own need its certificates, which may be elsewhere by now.
     let replayed = run.files.get(REPLAYABLE).and_then(|text| serde_json::from_slice::<Replayable>(text).ok());
     let limits = replayed.map(|replayed| {
@@ -83,7 +83,7 @@ fn data(run: &RunData, traces: &[Trace]) -> serde_json::Value {
 
 /// A value with the digits that a figure or its table can show.
 fn short(value: Option<f64>) -> Option<f64> {
-    value.map(|v| format!("{v:.6e}").parse().unwrap_or(v))
+    value.map(|v| rounded(v, 6))
 }
 
 #[cfg(test)]

@@ -3,6 +3,7 @@
 use super::html::{columns, escape, list, note, table};
 use super::human::{number, quantity};
 use super::plots::fidelity::{key, over_position, transfer};
+use crate::fidelity::dynamics::Part;
 use crate::fidelity::{Fidelity, Group, Late};
 use std::fmt::Write;
 
@@ -11,19 +12,14 @@ const DRAWN: usize = 3;
 
 /// Where the rendering of a group ends, by name.
 fn ends(group: &Group) -> String {
-    let mut text = match (&group.minus_3_db, group.known_minus_3_db_hz) {
-        (Some(found), Some(known)) => {
-            format!(
-                "-3 dB at {:.1} \u{b1} {:.1} Hz; the known dynamics give {known:.1} Hz",
-                found.hz, found.sd_hz
-            )
-        }
-        (Some(found), None) => format!("-3 dB at {:.1} \u{b1} {:.1} Hz", found.hz, found.sd_hz),
+    let found = group.minus_3_db.map(|at| format!("-3 dB at {:.1} \u{b1} {:.1} Hz", at.hz, at.sd_hz));
+    let mut text = match (found, group.known_minus_3_db_hz) {
+        (Some(found), Some(known)) => format!("{found}; the known dynamics give {known:.1} Hz"),
+        (Some(found), None) => found,
         (None, Some(known)) => format!("the known dynamics end at {known:.1} Hz"),
         (None, None) => "the dynamics are not known".into(),
     };
-    let part =
-        |p: &super::super::fidelity::dynamics::Part| Some(format!("{} {:.0} Hz", p.name, p.corner_hz?));
+    let part = |p: &Part| Some(format!("{} {:.0} Hz", p.name, p.corner_hz?));
     let parts: Vec<String> = group.parts.iter().filter_map(part).collect();
     if !parts.is_empty() {
         let _ = write!(text, " (each alone: {})", parts.join(", "));
@@ -50,13 +46,11 @@ fn slower(group: &Group) -> Vec<String> {
                 "the measured friction comes",
                 "the force sensor is slower than stated, or its times are shifted".to_string(),
             ),
-            _ => (
-                "the amplitude comes",
-                format!(
-                    "amplifier or plate is slower than stated; lead_s = {:.4} in [render] reads the target ahead",
-                    late.delay_s + group.lead_s
-                ),
-            ),
+            _ => {
+                let lead_s = late.delay_s + group.lead_s;
+                let lead = format!("lead_s = {lead_s:.4} in [render] reads the target ahead");
+                ("the amplitude comes", format!("amplifier or plate is slower than stated; {lead}"))
+            }
         };
         format!("{what} {delay} \u{b1} {sd} ms late, {known} ms are known: {remedy}")
     };
@@ -88,9 +82,6 @@ pub fn lines(fidelity: &Fidelity) -> Vec<String> {
 }
 
 /// The section of a run's page.
-///
-/// # Errors
-/// Only if the drawing library fails.
 pub(super) fn section(fidelity: &Fidelity) -> miette::Result<String> {
     let head = columns(
         "U, mm/s|load, N|passes|&mu;' off, rms|mean|within tolerance|shift, mm|rms without it|\
@@ -114,7 +105,6 @@ pub(super) fn section(fidelity: &Fidelity) -> miette::Result<String> {
             escape(&ends(g)),
         )
     };
-    let rows: String = fidelity.groups.iter().map(row).collect();
     let mut figures = String::new();
     for group in fidelity.groups.iter().take(DRAWN) {
         for (places, way) in group.profiles.iter().zip(["forward", "backward"]).filter(|(p, _)| p.len() > 1) {
@@ -135,7 +125,7 @@ pub(super) fn section(fidelity: &Fidelity) -> miette::Result<String> {
     let remarks = if remarks.is_empty() { String::new() } else { list(&remarks, "") };
     Ok(format!(
         "<h2>Rendered friction</h2>{}{remarks}<div class=\"panels\">{figures}</div>{}{}{}",
-        table("Fidelity by speed", &head, &rows),
+        table("Fidelity by speed", &head, fidelity.groups.iter().map(row)),
         note(
             "Grey: wanted &mu;'. Dashed: predicted by the law at the amplitude read back. Line and band: measured, with twice the \
              standard deviation over the repeats. The shift is the way by which the measurement comes after the target, forward and backward."

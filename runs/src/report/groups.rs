@@ -1,10 +1,11 @@
 //! The page of more than two runs: their groups on one figure, and the differences at each condition.
 
-use super::explore::script;
-use super::html::{column, columns, escape, glossary, list, note, shell, table};
+use super::explore::{place, script};
+use super::html::{cell, column, columns, escape, glossary, list, note, numeric, row, shell, table};
 use super::plots::comparison::{group_differences, group_overlay};
-use crate::compare::groups::{AtCondition, GroupBy, Grouped};
+use crate::compare::groups::{AtCondition, Group, GroupBy, Grouped};
 use std::fmt::Write;
+use std::path::PathBuf;
 
 /// The page.
 pub fn page(compared: &Grouped) -> miette::Result<String> {
@@ -24,62 +25,47 @@ pub fn page(compared: &Grouped) -> miette::Result<String> {
     if !compared.warnings.is_empty() {
         let _ = write!(html, "<h2>Caution</h2>{}", list(&compared.warnings, ""));
     }
-    let data = serde_json::to_string(compared).map_err(|e| miette::miette!("{e}"))?.replace('<', "\\u003c");
+    let data = serde_json::to_string(compared).map_err(|e| miette::miette!("{e}"))?;
     let _ = write!(
         html,
-        "<section id=\"explore\" hidden></section><script type=\"application/json\" id=\"run-data\">{data}</script>\n\
-         <h2>Relative friction of all groups</h2>{}<h2>Differences from the first group</h2>{}",
+        "{}<h2>Relative friction of all groups</h2>{}<h2>Differences from the first group</h2>{}",
+        place(&data),
         group_overlay(compared)?,
         group_differences(compared)?
     );
     html += &conditions(compared);
     html += &glossary();
-    html += &script(
-        "exploreGroups(document.getElementById(\"explore\"), JSON.parse(document.getElementById(\"run-data\").textContent), document);",
-    );
+    html += &script("exploreGroups");
     Ok(shell(&title, &html))
 }
 
 fn groups(compared: &Grouped) -> String {
-    let row = |group: &crate::compare::groups::Group| {
-        let runs: Vec<String> = group
-            .runs
-            .iter()
-            .zip(&group.mu0)
-            .map(|(run, mu0)| {
-                let name = run.file_name().unwrap_or(run.as_os_str()).to_string_lossy();
-                format!("{} ({mu0:.3})", escape(&name))
-            })
-            .collect();
-        format!(
-            "<tr><th scope=\"row\">{}</th><td class=\"n\">{}</td><td>{}</td></tr>\n",
-            escape(&group.name),
-            group.runs.len(),
-            runs.join(", ")
-        )
+    let row = |group: &Group| {
+        let run = |(run, mu0): (&PathBuf, &f64)| {
+            let name = run.file_name().unwrap_or(run.as_os_str()).to_string_lossy();
+            format!("{} ({mu0:.3})", escape(&name))
+        };
+        let runs: Vec<String> = group.runs.iter().zip(&group.mu0).map(run).collect();
+        row(escape(&group.name), [numeric(runs.len()), cell(runs.join(", "))]) + "\n"
     };
-    let rows: String = compared.groups.iter().map(row).collect();
     let head = columns("group|#runs|folders (\u{3bc}<sub>0</sub>)");
-    table("Groups", &head, &rows)
+    table("Groups", &head, compared.groups.iter().map(row))
 }
 
 fn conditions(compared: &Grouped) -> String {
     let mut head = columns("#w, \u{b5}m|#f, kHz|#U, mm/s|#load, N");
     head += &compared.groups.iter().map(|g| column(&format!("#{}", escape(&g.name)))).collect::<String>();
-    let less = |g: &crate::compare::groups::Group| column(&format!("#{} less first", escape(&g.name)));
+    let less = |g: &Group| column(&format!("#{} less first", escape(&g.name)));
     head += &compared.groups[1..].iter().map(less).collect::<String>();
     let row = |c: &AtCondition| {
-        let mut cells = format!(
-            "<td class=\"n\">{:.2}</td><td class=\"n\">{:.1}</td><td class=\"n\">{:+.1}</td><td class=\"n\">{:.2}</td>",
-            c.amplitude_pp_m * 1e6,
-            c.frequency_hz / 1e3,
-            c.velocity_m_s * 1e3,
-            c.normal_force_n
-        );
+        let (w, f, u) = (c.amplitude_pp_m * 1e6, c.frequency_hz / 1e3, c.velocity_m_s * 1e3);
+        let [w, f, u, n] =
+            [format!("{w:.2}"), format!("{f:.1}"), format!("{u:+.1}"), format!("{:.2}", c.normal_force_n)];
+        let mut cells = [w, f, u, n].map(numeric).concat();
         for mean in &c.means {
             let text =
                 mean.map_or("not measured".into(), |m| format!("{:.3} &plusmn; {:.3}", m.mu_relative, m.sd));
-            let _ = write!(cells, "<td class=\"n\">{text}</td>");
+            cells += &numeric(text);
         }
         for d in &c.differences {
             let text = d.map_or("&ndash;".into(), |d| {
@@ -92,13 +78,12 @@ fn conditions(compared: &Grouped) -> String {
         }
         format!("<tr>{cells}</tr>\n")
     };
-    let rows: String = compared.conditions.iter().map(row).collect();
     format!(
         "<h2>Condition by condition</h2>{}{}",
         note(
             "Differences have intervals of 95 %, each for itself; those without zero are bold. *: a group of one run, whose interval \
              leaves out how far another run would lie."
         ),
-        table("All conditions", &head, &rows)
+        table("All conditions", &head, compared.conditions.iter().map(row))
     )
 }

@@ -74,8 +74,24 @@ pub fn columns(titles: &str) -> String {
     titles.split('|').map(column).collect()
 }
 
+/// A cell of a table, HTML already.
+pub(crate) fn cell(text: impl Display) -> String {
+    format!("<td>{text}</td>")
+}
+
+/// A cell with a number.
+pub(crate) fn numeric(text: impl Display) -> String {
+    format!("<td class=\"n\">{text}</td>")
+}
+
+/// A row of a table: its head and its cells, HTML already.
+pub(crate) fn row(head: impl Display, cells: impl IntoIterator<Item = String>) -> String {
+    format!("<tr><th scope=\"row\">{head}</th>{}</tr>", cells.into_iter().collect::<String>())
+}
+
 /// A table that scrolls by itself where the page is narrower, also by the keyboard. Head and rows are HTML already.
-pub fn table(label: &str, head: &str, rows: &str) -> String {
+pub fn table(label: &str, head: &str, rows: impl IntoIterator<Item = String>) -> String {
+    let rows: String = rows.into_iter().collect();
     format!(
         "<div class=\"scroll\" tabindex=\"0\" role=\"region\" aria-label=\"{}\"><table><thead><tr>{head}</tr></thead>\
          <tbody>{rows}</tbody></table></div>\n",

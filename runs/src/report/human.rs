@@ -1,5 +1,8 @@
 //! Quantities as people read them: three digits, and the prefix that keeps the number near one.
 
+use models::condition::Condition;
+use models::covariate::Covariate;
+
 /// Units of an SI unit in which people read it: factor and name, in the order of preference.
 const SHOWN: [(&str, &[(f64, &str)]); 14] = [
     ("m", &[(1e6, "\u{b5}m"), (1e3, "mm"), (1.0, "m"), (1e9, "nm")]),
@@ -90,12 +93,24 @@ pub fn with_interval(value: f64, [low, high]: [f64; 2], unit: &str) -> String {
 /// A value with its unit, in the scale in which people read it: `100 um`.
 pub fn quantity(value: f64, unit: &str) -> String {
     let (factor, shown) = scale(value.abs(), unit);
-    format!("{} {shown}", number(round_off(value * factor))).trim_end().to_string()
+    format!("{} {shown}", number(rounded(value * factor, 9))).trim_end().to_string()
 }
 
-/// Without the last digits, which only the arithmetic brings in.
-fn round_off(value: f64) -> f64 {
-    format!("{value:.9e}").parse().unwrap_or(value)
+/// A value with so many digits behind the first: without the last ones, which only the arithmetic brings in.
+pub(crate) fn rounded(value: f64, digits: usize) -> f64 {
+    format!("{value:.digits$e}").parse().unwrap_or(value)
+}
+
+/// Values of covariates with their units: the settings of a condition, as far as it has them.
+pub(crate) fn settings<'a>(of: impl Iterator<Item = &'a Covariate>, at: &Condition) -> String {
+    let one = |c: &Covariate| Some(format!("{} {}", number(c.shown.0 * c.of(at)?), c.shown.1));
+    of.filter_map(one).collect::<Vec<_>>().join(", ")
+}
+
+/// A covariate with its unit, where it has one: the title of an axis or a column.
+pub fn titled(c: &Covariate) -> String {
+    let comma = if c.shown.1.is_empty() { "" } else { ", " };
+    [c.words, comma, c.shown.1].concat()
 }
 
 /// The scale in which a size is read: the first listed that puts it between a tenth and a thousand, else the nearest to one.

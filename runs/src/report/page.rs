@@ -1,7 +1,7 @@
 //! The page: words and tables around the figures.
 
 use super::RunData;
-use super::html::{columns, escape, glossary, head, note, shell, table};
+use super::html::{cell, columns, escape, glossary, head, list, note, row, shell, table};
 use super::human::number;
 use super::published::Published;
 use super::traces::Trace;
@@ -54,34 +54,28 @@ pub(super) fn page(run: &RunData, traces: &[Trace], overlay: &[Published]) -> mi
 }
 
 fn verdict(w: &mut String, run: &RunData) {
-    let departed = run.passes.iter().any(|p| p.comparison.is_some_and(|c| c.departed));
+    let departed = run.passes.iter().find(|p| p.comparison.is_some_and(|c| c.departed));
     let made = run.passes.len();
-    let outcome = match &run.summary {
+    let planned = run.summary.as_ref().map_or(0, |s| s.planned);
+    let outcome = match run.summary.as_ref().map(|s| &s.outcome) {
         None => "The run has no ending: it was killed, or is still going.".to_string(),
-        Some(s) => {
-            let planned = s.planned;
-            match &s.outcome {
-                Outcome::Complete => format!("Complete: {made} of {planned} passes."),
-                Outcome::Tripped(trip) => format!(
-                    "Ended early after {made} of {planned} passes: tripped, {}.<br>{}",
-                    escape(&trip.to_string()),
-                    escape(trip.cause.remedy())
-                ),
-                Outcome::WouldNotArm { blocking: Some(cause) } => {
-                    format!("The rig would not arm: {}.<br>{}", escape(cause.words()), escape(cause.remedy()))
-                }
-                outcome => {
-                    format!("Ended early after {made} of {planned} passes: {}.", escape(&outcome.words()))
-                }
-            }
+        Some(Outcome::Complete) => format!("Complete: {made} of {planned} passes."),
+        Some(Outcome::Tripped(trip)) => {
+            let [trip, remedy] = [&*trip.to_string(), trip.cause.remedy()].map(escape);
+            format!("Ended early after {made} of {planned} passes: tripped, {trip}.<br>{remedy}")
+        }
+        Some(Outcome::WouldNotArm { blocking: Some(cause) }) => {
+            format!("The rig would not arm: {}.<br>{}", escape(cause.words()), escape(cause.remedy()))
+        }
+        Some(outcome) => {
+            format!("Ended early after {made} of {planned} passes: {}.", escape(&outcome.words()))
         }
     };
-    let finding = if departed {
-        let first = run.passes.iter().find(|p| p.comparison.is_some_and(|c| c.departed));
-        let at = first.map_or(0, |p| p.pass.point);
+    let finding = if let Some(first) = departed {
         format!(
-            "<strong>The measurement disagrees with the model</strong> (first at pass {at}). \
-                 Run <code>muprime diagnose</code> on this folder to learn where and why."
+            "<strong>The measurement disagrees with the model</strong> (first at pass {}). \
+                 Run <code>muprime diagnose</code> on this folder to learn where and why.",
+            first.pass.point
         )
     } else {
         let complete = run.summary.as_ref().is_some_and(|s| s.outcome == Outcome::Complete);
@@ -90,16 +84,16 @@ fn verdict(w: &mut String, run: &RunData) {
     };
     let psi_star =
         run.psi_star().map_or_else(String::new, |found| format!("<br>{}.", escape(&found.to_string())));
-    let class = if departed { "verdict departed" } else { "verdict" };
+    let class = if departed.is_some() { "verdict departed" } else { "verdict" };
     let _ = writeln!(w, "<p class=\"{class}\">{finding}<br>{outcome}{psi_star}</p>");
     for remark in about::remarks(&run.passes) {
         let _ = writeln!(w, "<p class=\"verdict departed\">{}.</p>", escape(&remark));
     }
     if !run.damage.is_empty() {
-        let items: String = run.damage.iter().map(|d| format!("<li>{}</li>", escape(d))).collect();
         let _ = writeln!(
             w,
-            "<div class=\"verdict departed\"><strong>The records of this run are not whole</strong><ul>{items}</ul></div>"
+            "<div class=\"verdict departed\"><strong>The records of this run are not whole</strong>{}</div>",
+            list(&run.damage, "")
         );
     }
     let flagged = run.passes.iter().filter(|p| !p.temperature_flags.is_empty()).count();
@@ -138,9 +132,8 @@ fn levels(run: &RunData) -> String {
             f.lost
         )
     };
-    let rows: String = found.iter().map(row).collect();
     let head = columns("quantity|unit|planned|found|range|how|oldest reading, s|passes|level lost");
-    format!("<h2>Air and protocol</h2>{}", table("Air and protocol", &head, &rows))
+    format!("<h2>Air and protocol</h2>{}", table("Air and protocol", &head, found.iter().map(row)))
 }
 
 fn timing(w: &mut String, run: &RunData) -> miette::Result<()> {
@@ -148,8 +141,7 @@ fn timing(w: &mut String, run: &RunData) -> miette::Result<()> {
         let _ = writeln!(w, "<h2>Loop</h2><p>No loop timing: virtual time, or no ending.</p>");
         return Ok(());
     };
-    let us = |ns: u64| format!("{:.0} \u{b5}s", ns as f64 / 1e3);
-    let [p50, _, p99, p999, max] = report.lateness_ns;
+    let [p50, _, p99, p999, max] = report.lateness_ns.map(|ns| format!("{:.0} \u{b5}s", ns as f64 / 1e3));
     let granted = &report.grants;
     let class = match &granted.policy_refused {
         None => format!("{} priority {}", escape(&granted.policy), granted.priority),
@@ -158,17 +150,13 @@ fn timing(w: &mut String, run: &RunData) -> miette::Result<()> {
     let locked = if granted.memory_locked { "memory locked" } else { "memory not locked" };
     let _ = write!(
         w,
-        "<h2>Loop</h2>{}{}<p>{} cycles of {} \u{b5}s. Lateness: median {}, 99 % {}, 99.9 % {}, worst {}. \
+        "<h2>Loop</h2>{}{}<p>{} cycles of {} \u{b5}s. Lateness: median {p50}, 99 % {p99}, 99.9 % {p999}, worst {max}. \
          {} deadlines missed. Scheduling: {class}, {locked}. Page faults in the loop: {} minor, {} major. \
          Rows lost: {}.{}</p>",
         plots::run::lateness(report)?,
         note("How late the loop was at each deadline, missed ones included. Both axes logarithmic."),
         report.cycles,
         report.period_ns / 1000,
-        us(p50),
-        us(p99),
-        us(p999),
-        us(max),
         report.overruns,
         report.minor_faults,
         report.major_faults,
@@ -209,7 +197,7 @@ fn passes(w: &mut String, run: &RunData) {
             signed(c.map(|c| c.z), 1),
         );
     }
-    let all = table("All passes", &head, &rows).replacen("<table>", "<table class=\"nums\">", 1);
+    let all = table("All passes", &head, [rows]).replacen("<table>", "<table class=\"nums\">", 1);
     let _ = writeln!(
         w,
         "<details><summary>All {} passes</summary>{}{all}</details>",
@@ -224,9 +212,8 @@ fn passes(w: &mut String, run: &RunData) {
 
 fn facts(w: &mut String, run: &RunData) {
     let row = |(name, value): (&String, &String)| {
-        format!("<tr><th scope=\"row\">{}</th><td><code>{}</code></td></tr>\n", escape(name), escape(value))
+        row(escape(name), [cell(format!("<code>{}</code>", escape(value)))]) + "\n"
     };
-    let rows: String = run.facts.iter().map(row).collect();
-    let all = table("The record", &columns("fact|value"), &rows);
+    let all = table("The record", &columns("fact|value"), run.facts.iter().map(row));
     let _ = writeln!(w, "<details><summary>The record</summary>{all}</details>");
 }

@@ -44,6 +44,11 @@ fn wrong(e: impl std::fmt::Display) -> miette::Report {
     miette::miette!("a figure: {e}")
 }
 
+/// The least and the greatest of some values.
+pub(crate) fn ends(values: impl IntoIterator<Item = f64>) -> (f64, f64) {
+    values.into_iter().fold((f64::INFINITY, f64::NEG_INFINITY), |(l, h), v| (l.min(v), h.max(v)))
+}
+
 fn capital(word: &str) -> String {
     let mut letters = word.chars();
     letters.next().map_or(String::new(), |first| first.to_uppercase().collect::<String>() + letters.as_str())
@@ -75,7 +80,7 @@ impl Span {
     /// Over all of these values with a margin, logarithmic where it may be and they span more than a decade:
     /// within one such an axis has a single label.
     pub fn over(values: impl Iterator<Item = f64>, logarithmic: bool) -> Self {
-        let (low, high) = values.fold((f64::INFINITY, f64::NEG_INFINITY), |(l, h), v| (l.min(v), h.max(v)));
+        let (low, high) = ends(values);
         if logarithmic && low > 0.0 && high > 10.0 * low {
             let margin = (high / low).powf(0.04);
             return Span::logarithmic(low / margin..high * margin);

@@ -2,7 +2,7 @@
 //! user's file, each with its source.
 
 use super::RunData;
-use super::html::{columns, escape, note, table};
+use super::html::{cell, columns, escape, note, numeric, row, table};
 use super::human::number;
 use super::plots::published::panels;
 use crate::input::{MAX_TABLE_BYTES, bytes_of};
@@ -136,33 +136,27 @@ pub fn section(run: &RunData, all: &[Published]) -> miette::Result<String> {
     if all.is_empty() {
         return Ok(String::new());
     }
-    let cell = |value: Option<f64>, scale: f64| {
-        let text = value.map_or("&ndash;".into(), |v| number(v * scale));
-        format!("<td class=\"n\">{text}</td>")
-    };
+    let scaled = |value: Option<f64>, scale: f64| value.map_or("&ndash;".into(), |v| number(v * scale));
     let with_sd = |value: Option<f64>, sd: Option<f64>| match (value, sd) {
-        (Some(v), Some(sd)) => format!("<td class=\"n\">{} &plusmn; {}</td>", number(v), number(sd)),
-        (value, _) => cell(value, 1.0),
+        (Some(v), Some(sd)) => format!("{} &plusmn; {}", number(v), number(sd)),
+        (value, _) => scaled(value, 1.0),
     };
     let row = |one: &Published| {
         let amplitude = match (one.amplitude_pp_m, one.amplitude_to_m) {
-            (Some(from), Some(to)) => {
-                format!("<td class=\"n\">{} to {}</td>", number(from * 1e6), number(to * 1e6))
-            }
-            (from, _) => cell(from, 1e6),
+            (Some(from), Some(to)) => format!("{} to {}", number(from * 1e6), number(to * 1e6)),
+            (from, _) => scaled(from, 1e6),
         };
-        format!(
-            "<tr><th scope=\"row\">{}</th><td>{}</td>{amplitude}{}{}{}{}{}</tr>\n",
-            escape(&one.named()),
-            escape(&one.what),
-            cell(one.frequency_hz, 1e-3),
-            cell(one.speed_m_s, 1e3),
-            cell(one.normal_force_n, 1.0),
+        let numbers = [
+            amplitude,
+            scaled(one.frequency_hz, 1e-3),
+            scaled(one.speed_m_s, 1e3),
+            scaled(one.normal_force_n, 1.0),
             with_sd(one.mu_relative, one.mu_relative_sd),
             with_sd(one.psi_star, one.psi_star_sd),
-        )
+        ];
+        let cells = std::iter::once(cell(escape(&one.what))).chain(numbers.map(numeric));
+        row(escape(&one.named()), cells) + "\n"
     };
-    let rows: String = all.iter().map(row).collect();
     let head = columns("source|what|#w, \u{b5}m|#f, kHz|#U, mm/s|#load, N|#\u{3bc}'|#\u{3a8}*");
     let text = if all.iter().any(|one| one.of_paper) {
         note(
@@ -175,7 +169,7 @@ pub fn section(run: &RunData, all: &[Published]) -> miette::Result<String> {
     Ok(format!(
         "<h2>Published values</h2>{}{text}{}",
         panels(run, all)?,
-        table("Published values", &head, &rows)
+        table("Published values", &head, all.iter().map(row))
     ))
 }
 

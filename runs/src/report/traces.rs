@@ -1,13 +1,11 @@
 //! What the record holds of a pass's cycles, few enough for a page: of each stretch of time the least and the greatest, so that no peak is lost.
+//! An error is a record that cannot be opened; what is damaged is left out.
 
-use crate::run_dir::records_in;
-use miette::{IntoDiagnostic, WrapErr};
+use crate::run_dir::{open_record, records_in};
 use realtime::cycle::Phase;
-use realtime::recorder::{self, Entry, Reader};
+use realtime::recorder::{self, Entry};
 use realtime::turn::Row;
 use serde::Serialize;
-use std::fs::File;
-use std::io::BufReader;
 use std::path::Path;
 
 /// Stretches of a pass at most: twice as many values of each quantity.
@@ -77,9 +75,6 @@ impl Cycle {
 }
 
 /// The passes of a run's records, in the order in which they were made.
-///
-/// # Errors
-/// A record that cannot be opened; what is damaged is left out.
 pub fn of(folder: &Path) -> miette::Result<Vec<Trace>> {
     let mut traces = Vec::new();
     passes(folder, None, |cycles| traces.extend(trace(cycles, cycles.len().div_ceil(STRETCHES))))?;
@@ -87,9 +82,6 @@ pub fn of(folder: &Path) -> miette::Result<Vec<Trace>> {
 }
 
 /// The same between two loop times in s, as finely as a screen shows it.
-///
-/// # Errors
-/// A record that cannot be opened; what is damaged is left out.
 pub fn within(folder: &Path, window_s: [f64; 2]) -> miette::Result<Window> {
     let mut all = Vec::new();
     passes(folder, Some(window_s), |cycles| all.push(cycles.to_vec()))?;
@@ -100,8 +92,7 @@ pub fn within(folder: &Path, window_s: [f64; 2]) -> miette::Result<Window> {
 /// Hands on the cycles of each pass.
 fn passes(folder: &Path, window_s: Option<[f64; 2]>, mut each: impl FnMut(&[Cycle])) -> miette::Result<()> {
     for path in records_in(folder)? {
-        let file = File::open(&path).into_diagnostic().wrap_err_with(|| path.display().to_string())?;
-        let mut reader = Reader::new(BufReader::new(file)).only(recorder::CYCLES);
+        let mut reader = open_record(&path, recorder::CYCLES)?;
         let mut cycles: Vec<Cycle> = Vec::new();
         let mut window = [0, u64::MAX];
         while let Some(entry) = reader.next() {

@@ -1,4 +1,4 @@
-//! What of a run's folder is no longer what was written.
+//! What of a run's folder is no longer what was written. An error is a file or folder that cannot be read.
 
 use super::lines::{whole_passes, whole_table};
 use super::{IDENTITY, JOURNAL, POINTS, is_held, passes_in, records_in, sessions_in};
@@ -12,9 +12,6 @@ use std::path::Path;
 /// What is damaged in a run's folder: its records from their first byte to their last, and its table
 /// compared with its journal. Empty where nothing is; a session that was killed or is still going has a
 /// record that is cut.
-///
-/// # Errors
-/// A folder that cannot be read.
 pub fn damage_in(path: &Path) -> miette::Result<Vec<String>> {
     let mut findings = Vec::new();
     for record in records_in(path)? {
@@ -39,9 +36,6 @@ pub fn of_file(file: &Path, finding: &str) -> String {
 }
 
 /// Sessions whose record is gone.
-///
-/// # Errors
-/// A folder that cannot be read.
 pub fn missing_records(path: &Path) -> miette::Result<Vec<String>> {
     let sessions = sessions_in(path)?.into_iter().map(|s| s.session);
     let gone = sessions.filter(|n| !path.join(format!("run-{n}.mcap")).exists());
@@ -50,9 +44,6 @@ pub fn missing_records(path: &Path) -> miette::Result<Vec<String>> {
 
 /// Points whose line in the table is not what the journal holds, and how many the table lacks: each counts
 /// once. The pass that a living session is storing is not missing.
-///
-/// # Errors
-/// A table or a journal that cannot be read.
 pub fn differences(path: &Path, passes: &[MeasuredPass]) -> miette::Result<Vec<String>> {
     let (table, _) = whole_table(&fs::read(path.join(POINTS)).into_diagnostic()?)?;
     let (journal, _) = whole_passes(&fs::read(path.join(JOURNAL)).into_diagnostic()?)?;

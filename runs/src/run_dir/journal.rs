@@ -73,10 +73,8 @@ fn agree(path: &Path, table: &[Pass], journal: &[MeasuredPass]) -> miette::Resul
 }
 
 /// Puts the passes into the table that the journal alone holds: after a crash between the two the last one,
-/// of a table that was cut or lost all that it lacks. None of them is driven again.
-///
-/// # Errors
-/// A point that the table alone holds, or whatever the file system says.
+/// of a table that was cut or lost all that it lacks. None of them is driven again. A point that the table
+/// alone holds is an error.
 pub(super) fn restore(
     path: &Path,
     table: &mut Placed,

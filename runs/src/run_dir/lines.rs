@@ -1,4 +1,5 @@
-//! Files that grow line by line: what of them is whole after a crash or a power cut.
+//! Files that grow line by line: what of them is whole after a crash or a power cut. An error is a line
+//! that is damaged, and not by a torn end.
 
 use crate::sequence::MeasuredPass;
 use miette::IntoDiagnostic;
@@ -23,17 +24,11 @@ fn whole<T>(bytes: &[u8], read: impl Fn(&[u8]) -> miette::Result<T>) -> miette::
 }
 
 /// The passes of a point table.
-///
-/// # Errors
-/// A line that is damaged, and not by a torn end.
 pub(super) fn whole_table(bytes: &[u8]) -> miette::Result<(Vec<Pass>, usize)> {
     whole(bytes, |bytes| pass::read_passes(bytes).into_diagnostic())
 }
 
 /// The passes of a journal.
-///
-/// # Errors
-/// A line that is damaged, and not by a torn end.
 pub(super) fn whole_passes(bytes: &[u8]) -> miette::Result<(Vec<MeasuredPass>, usize)> {
     let line = |(i, line): (usize, &[u8])| {
         serde_json::from_slice(line).map_err(|e| miette::miette!("line {}: {e}", i + 1))

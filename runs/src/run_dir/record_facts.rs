@@ -1,12 +1,9 @@
 //! What a run's record says of the run besides its passes.
 
-use super::records_in;
-use miette::{IntoDiagnostic, WrapErr};
-use realtime::recorder::{self, Entry, Reader};
+use super::{open_record, records_in};
+use realtime::recorder::{self, Entry};
 use std::collections::BTreeMap;
-use std::fs::File;
-use std::io::BufReader;
-use std::path::Path;
+use std::path::{Path, PathBuf};
 
 /// Entries of a record among which its facts are.
 const HEAD: usize = 64;
@@ -17,15 +14,13 @@ pub type RecordFacts = BTreeMap<String, String>;
 /// The facts at the head of a run's first record; none where there is no record that says any. It reads
 /// no cycle.
 pub fn header_facts(folder: &Path) -> RecordFacts {
-    let head = |path: &std::path::PathBuf| {
-        let reader = Reader::new(BufReader::new(File::open(path).ok()?)).only(recorder::EVENTS);
-        let header = |entry| match entry {
-            Entry::Facts { name, facts } if name == recorder::HEADER => Some(facts),
-            _ => None,
-        };
-        reader.take(HEAD).find_map(header)
+    let header = |entry| match entry {
+        Entry::Facts { name, facts } if name == recorder::HEADER => Some(facts),
+        _ => None,
     };
-    records_in(folder).ok().and_then(|all| head(all.first()?)).unwrap_or_default()
+    let head =
+        |all: Vec<PathBuf>| open_record(all.first()?, recorder::EVENTS).ok()?.take(HEAD).find_map(header);
+    records_in(folder).ok().and_then(head).unwrap_or_default()
 }
 
 /// What the first record of a run says of it.
@@ -35,10 +30,8 @@ pub fn header_facts(folder: &Path) -> RecordFacts {
 pub fn record_facts(folder: &Path) -> miette::Result<RecordFacts> {
     let first = records_in(folder)?.into_iter().next();
     let path = first.ok_or_else(|| miette::miette!("{} holds no record", folder.display()))?;
-    let file = File::open(&path).into_diagnostic().wrap_err_with(|| path.display().to_string())?;
     let mut all = RecordFacts::new();
-    let mut reader = Reader::new(BufReader::new(file)).only(recorder::EVENTS);
-    for entry in &mut reader {
+    for entry in open_record(&path, recorder::EVENTS)? {
         match entry {
             Entry::Facts { name, facts } if name == recorder::HEADER => all.extend(facts),
             Entry::File { name, bytes, .. } => {

@@ -18,7 +18,6 @@ const ARM_WITHIN: Nanos = Nanos(10_000_000_000);
 /// Nothing may have stood in the way for this long before a reset is requested.
 const CLEAR_FOR: Nanos = Nanos(50_000_000);
 /// A reset that found something in its way is requested again, so often in all. Each waits for a clear way.
-/// stands in the way.
 const ASKS: u32 = 3;
 /// Time that the loop has to answer a reset.
 const ANSWER_WITHIN: Nanos = Nanos(200_000_000);
@@ -71,11 +70,11 @@ impl Arming {
         Arming { overrun, human_contact: limits.human_contact, ..self }
     }
 
-    /// The same rig, to be armed once more after a person was at it: its supply is open on purpose, which is
-    /// no news.
-    pub(super) fn afresh(self) -> Self {
+    /// The same rig, to be armed once more. After a person was at it its supply is open on purpose
+    /// (`cut_reported`), which is no news.
+    pub(super) fn afresh(self, cut_reported: bool) -> Self {
         let Arming { overrun, human_contact, .. } = self;
-        Arming { overrun, human_contact, cut_reported: true, ..Arming::new() }
+        Arming { overrun, human_contact, cut_reported, ..Arming::default() }
     }
 
     /// Takes a row.

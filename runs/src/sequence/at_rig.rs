@@ -10,7 +10,7 @@
 //! ([`crate::ambient::Bench`]); this file only decides, so it runs in virtual time as in wall-clock time.
 
 use super::{Event, Outcome, QUIET_WITHIN, Reaction, STANDS_M_S, Sequence, Stage, Sums, awake};
-use crate::ambient::{AIR, By, Found, Level, Means, OfAir, Source, Tolerances, shown};
+use crate::ambient::{AIR, By, Found, Level, Means, OfAir, Source, shown};
 use crate::plan::{Step, When};
 use models::condition::{Ambient, Condition};
 use realtime::cycle::{Command, Phase};
@@ -42,27 +42,25 @@ enum Task {
     Step(Step),
 }
 
-/// What a task waits for now.
+impl Task {
+    /// What is to be done.
+    fn words(&self) -> String {
+        match self {
+            Task::Level(at, wanted) => format!("set {}", shown(*at, *wanted)),
+            Task::Step(step) => step.instruction().to_string(),
+        }
+    }
+}
+
+/// What a task waits for now, and since when: the rig to be read back off, the next task to begin, an answer,
+/// a level (and since when it is within its tolerance), a timer.
 #[derive(Clone, Copy, Debug, PartialEq)]
 enum Wait {
-    /// The rig to be read back off.
-    Off {
-        since: Nanos,
-    },
-    /// The next task.
+    Off { since: Nanos },
     Begin,
-    Answer {
-        since: Nanos,
-    },
-    /// A level, and since when it is within its tolerance.
-    There {
-        since: Nanos,
-        within: Option<Nanos>,
-    },
-    Timer {
-        since: Nanos,
-        until: Nanos,
-    },
+    Answer { since: Nanos },
+    There { since: Nanos, within: Option<Nanos> },
+    Timer { since: Nanos, until: Nanos },
 }
 
 /// What comes once everything was waited for.
@@ -79,7 +77,8 @@ pub(super) struct AtRig {
     tolerance: OfAir<f64>,
     reached_within_s: f64,
     steps: Vec<Step>,
-    simulated: bool,
+    /// The rig is a virtual one.
+    pub(super) simulated: bool,
     found: OfAir<Option<Found>>,
     /// The level that was set and reached last.
     level: OfAir<Option<f64>>,
@@ -89,7 +88,8 @@ pub(super) struct AtRig {
     previous: Option<Task>,
     wait: Option<Wait>,
     then: Option<Then>,
-    disarmed: bool,
+    /// The rig was disarmed for a person.
+    pub(super) disarmed: bool,
     repeats: u32,
     begun: bool,
     /// When the rig was last seen off and at rest while a person was at it.
@@ -115,29 +115,21 @@ pub struct Question {
 }
 
 impl AtRig {
-    pub(super) fn of(
-        sets: OfAir<bool>,
-        means: OfAir<Option<Means>>,
-        tolerances: &Tolerances,
-        steps: &[Step],
-        simulated: bool,
-    ) -> Self {
-        let mut means = means;
-        for (means, sets) in means.iter_mut().zip(sets) {
-            *means = means.filter(|_| sets);
-        }
-        AtRig {
-            means,
-            tolerance: tolerances.of_air(),
-            reached_within_s: tolerances.reached_within_s,
-            steps: steps.to_vec(),
-            simulated,
-            ..AtRig::default()
-        }
-    }
-
     fn steps(&self, when: When) -> impl Iterator<Item = Task> + '_ {
         self.steps.iter().filter(move |step| step.when == when).cloned().map(Task::Step)
+    }
+
+    /// Whether a person types what is read of a quantity.
+    fn by_hand(&self, at: usize) -> bool {
+        self.means[at].is_some_and(|means| means.reads == By::Operator)
+    }
+
+    /// Name of the number that a person types for a task.
+    fn types<'a>(&self, task: &'a Task) -> Option<&'a str> {
+        match task {
+            Task::Level(at, _) => self.by_hand(*at).then_some(AIR[*at].0.name),
+            Task::Step(step) => step.number_name(),
+        }
     }
 
     fn needs_a_person(&self, task: &Task) -> bool {
@@ -150,8 +142,7 @@ impl AtRig {
     /// A reading that is fresh enough; what a person confirmed holds until another level is requested.
     fn reading(&self, at: usize, now: Nanos) -> Option<Found> {
         let typed = |found: &Found| matches!(found.source, Source::Operator | Source::AnswersFile);
-        let by_hand = self.means[at].is_some_and(|means| means.reads == By::Operator);
-        self.found[at].filter(|f| by_hand || typed(f) || now.since(f.at).seconds() <= STALE_S)
+        self.found[at].filter(|f| self.by_hand(at) || typed(f) || now.since(f.at).seconds() <= STALE_S)
     }
 
     /// Whether a quantity is where the pass wants it.
@@ -212,6 +203,10 @@ impl AtRig {
 
     /// Puts what was found into the condition of a pass, and says how each value came about.
     pub(super) fn levels(&self, planned: &Condition, condition: &mut Condition, now: Nanos) -> Vec<Level> {
+        let level = |quantity: &str, planned, value, range, found: &Found, lost| {
+            let (quantity, age_s) = (quantity.into(), now.since(found.at).seconds());
+            Level { quantity, planned, value, range, source: found.source, age_s, lost }
+        };
         let mut levels = Vec::new();
         for (at, (covariate, _)) in AIR.iter().enumerate() {
             if self.means[at].is_none() {
@@ -225,36 +220,12 @@ impl AtRig {
             // A gauge that fell silent does not say that the level is still there.
             let silent = self.reading(at, now).is_none();
             let off = |w: f64| silent || range.iter().any(|v| (v - w).abs() > self.tolerance[at]);
-            levels.push(Level {
-                quantity: covariate.name.into(),
-                planned: wanted,
-                value,
-                range,
-                source: found.source,
-                age_s: now.since(found.at).seconds(),
-                lost: wanted.is_some_and(off),
-            });
+            levels.push(level(covariate.name, wanted, value, range, &found, wanted.is_some_and(off)));
         }
-        levels.extend(self.typed.iter().map(|(name, found)| Level {
-            quantity: name.clone(),
-            planned: None,
-            value: found.value,
-            range: [found.value; 2],
-            source: found.source,
-            age_s: now.since(found.at).seconds(),
-            lost: false,
-        }));
+        let typed =
+            |(name, found): (&String, &Found)| level(name, None, found.value, [found.value; 2], found, false);
+        levels.extend(self.typed.iter().map(typed));
         levels
-    }
-
-    /// Whether the rig is a virtual one.
-    pub(super) fn is_simulated(&self) -> bool {
-        self.simulated
-    }
-
-    /// Whether the rig was disarmed for a person.
-    pub(super) fn is_disarmed(&self) -> bool {
-        self.disarmed
     }
 
     /// Whether a quantity's column is what somebody set and read, and no other channel's.
@@ -266,9 +237,15 @@ impl AtRig {
 impl Sequence {
     /// The same, for a plan whose levels and steps are waited for at the rig.
     pub fn at_rig(self, plan: &crate::plan::Plan, setup: &crate::setup::Setup) -> Self {
-        let simulated = setup.file.virtual_rig.is_some();
-        let (sets, means) = (plan.sets_air(), setup.file.means());
-        let at_rig = AtRig::of(sets, means, &plan.file.tolerances, &plan.file.step, simulated);
+        let (sets, means, tolerances) = (plan.sets_air(), setup.file.means(), &plan.file.tolerances);
+        let at_rig = AtRig {
+            means: std::array::from_fn(|at| means[at].filter(|_| sets[at])),
+            tolerance: tolerances.of_air(),
+            reached_within_s: tolerances.reached_within_s,
+            steps: plan.file.step.clone(),
+            simulated: setup.file.virtual_rig.is_some(),
+            ..AtRig::default()
+        };
         Sequence { at_rig, ..self }
     }
 
@@ -307,24 +284,20 @@ impl Sequence {
     pub(super) fn waits_at_rig(&mut self, row: &Row, out: &mut Reaction) -> bool {
         let tasks = self.at_rig.before(&self.points[self.next].condition, row.now);
         self.at_rig.begun = true;
-        let waits = !tasks.is_empty();
-        if waits {
-            self.wait_for(tasks, Then::Pass, row, out);
-        }
-        waits
+        self.wait_for(tasks, Then::Pass, row, out)
     }
 
     /// After the last pass: steps, and then the end.
     pub(super) fn last_steps(&mut self, row: &Row, out: &mut Reaction) -> bool {
-        let tasks: VecDeque<Task> = self.at_rig.steps(When::After).collect();
-        let waits = !tasks.is_empty();
-        if waits {
-            self.wait_for(tasks, Then::End, row, out);
-        }
-        waits
+        let tasks = self.at_rig.steps(When::After).collect();
+        self.wait_for(tasks, Then::End, row, out)
     }
 
-    fn wait_for(&mut self, tasks: VecDeque<Task>, then: Then, row: &Row, out: &mut Reaction) {
+    /// Whether there is anything to wait for.
+    fn wait_for(&mut self, tasks: VecDeque<Task>, then: Then, row: &Row, out: &mut Reaction) -> bool {
+        if tasks.is_empty() {
+            return false;
+        }
         let person = tasks.iter().any(|task| self.at_rig.needs_a_person(task));
         // Neither a cycle nor a sample from here on belongs to the pass before.
         out.commands.push(Command::Set(Request::default(), self.marker(Phase::Idle)));
@@ -338,6 +311,7 @@ impl Sequence {
             a.wait = Some(Wait::Begin);
         }
         self.stage = Stage::AtRig;
+        true
     }
 
     pub(super) fn wait_at_rig(&mut self, row: &Row, out: &mut Reaction) {
@@ -368,8 +342,8 @@ impl Sequence {
             Some(Wait::Answer { since }) => self.take_answer(row, since, out),
             Some(Wait::There { since, within }) => self.look_at_level(row, since, within, out),
             Some(Wait::Timer { since, until }) if row.now >= until => {
-                if let Some(Task::Step(step)) = self.at_rig.tasks.front() {
-                    let (step, waited_s) = (step.instruction().to_string(), row.now.since(since).seconds());
+                if let Some(task) = self.at_rig.tasks.front() {
+                    let (step, waited_s) = (task.words(), row.now.since(since).seconds());
                     out.events.push(Event::Waited { step, waited_s });
                 }
                 self.done(row, out);
@@ -386,40 +360,28 @@ impl Sequence {
     /// Begins the first task that is left; with none, what comes then.
     fn next_task(&mut self, row: &Row, out: &mut Reaction) {
         let Some(task) = self.at_rig.tasks.front().cloned() else { return self.go_on(row, out) };
-        match task {
-            Task::Level(at, wanted) => {
-                let means = self.at_rig.means[at];
-                let quantity = AIR[at].0.name.to_string();
-                self.at_rig.level[at] = None;
-                if means.is_some_and(|means| means.needs_a_person()) {
-                    self.ask(row, Some(at), format!("set {}", shown(at, wanted)), Some(wanted), out);
-                }
-                if means.is_some_and(|means| means.sets != By::Operator) {
-                    out.set_level = Some((at, wanted));
-                    out.events.push(Event::LevelSet { quantity, wanted });
-                }
-                if means.is_none_or(|means| !means.needs_a_person()) {
-                    self.at_rig.wait = Some(Wait::There { since: row.now, within: None });
-                }
-            }
-            Task::Step(step) => {
-                self.ask(row, None, step.instruction().to_string(), step.usual_number(), out);
+        if self.at_rig.needs_a_person(&task) {
+            self.ask(&task, row, out);
+        } else {
+            self.at_rig.wait = Some(Wait::There { since: row.now, within: None });
+        }
+        if let Task::Level(at, wanted) = task {
+            self.at_rig.level[at] = None;
+            if self.at_rig.means[at].is_some_and(|means| means.sets != By::Operator) {
+                out.set_level = Some((at, wanted));
+                out.events.push(Event::LevelSet { quantity: AIR[at].0.name.to_string(), wanted });
             }
         }
     }
 
-    fn ask(&mut self, row: &Row, at: Option<usize>, step: String, usual: Option<f64>, out: &mut Reaction) {
-        let types = match (at, self.at_rig.tasks.front()) {
-            (Some(at), _) => {
-                let by_hand = |means: Means| means.reads == By::Operator;
-                self.at_rig.means[at].is_some_and(by_hand).then(|| AIR[at].0.name.to_string())
-            }
-            (None, Some(Task::Step(step))) => step.number_name().map(String::from),
-            _ => None,
+    fn ask(&mut self, task: &Task, row: &Row, out: &mut Reaction) {
+        let (usual, level) = match task {
+            Task::Level(at, wanted) => (Some(*wanted), Some((*at, *wanted))),
+            Task::Step(step) => (step.usual_number(), None),
         };
-        let level = at.zip(usual);
+        let types = self.at_rig.types(task).map(String::from);
         out.question = Some(Question { usual: usual.filter(|_| types.is_some()), level });
-        out.events.push(Event::OperatorStep { step, types });
+        out.events.push(Event::OperatorStep { step: task.words(), types });
         self.at_rig.answer = None;
         self.at_rig.wait = Some(Wait::Answer { since: row.now });
     }
@@ -429,13 +391,7 @@ impl Sequence {
         let Some(task) = self.at_rig.tasks.front().cloned() else { return };
         let typed = text.trim().replace(',', ".");
         let number = typed.parse::<f64>().ok().filter(|v| v.is_finite());
-        let (step, needs) = match &task {
-            Task::Level(at, wanted) => {
-                let by_hand = self.at_rig.means[*at].is_some_and(|m| m.reads == By::Operator);
-                (format!("set {}", shown(*at, *wanted)), by_hand)
-            }
-            Task::Step(step) => (step.instruction().to_string(), step.number_name().is_some()),
-        };
+        let (step, needs) = (task.words(), self.at_rig.types(&task).is_some());
         let after_s = row.now.since(since).seconds();
         out.events.push(Event::Answered { step, answer: text, number, answered_by: source, after_s });
         if typed.eq_ignore_ascii_case(AGAIN) {
@@ -479,7 +435,7 @@ impl Sequence {
     fn look_at_level(&mut self, row: &Row, since: Nanos, within: Option<Nanos>, out: &mut Reaction) {
         let Some(Task::Level(at, wanted)) = self.at_rig.tasks.front().cloned() else { return };
         let quantity = AIR[at].0.name.to_string();
-        let by_hand = self.at_rig.means[at].is_some_and(|m| m.reads == By::Operator);
+        let by_hand = self.at_rig.by_hand(at);
         let after_s = row.now.since(since).seconds();
         let now = self.at_rig.within(at, wanted, row.now).then(|| within.unwrap_or(row.now));
         let found = self.at_rig.reading(at, row.now);
@@ -491,8 +447,7 @@ impl Sequence {
             (self.at_rig.level[at], self.at_rig.repeats) = (Some(wanted), 0);
             return self.done(row, out);
         }
-        let again = by_hand && self.at_rig.repeats < ASKS;
-        if again {
+        if by_hand && self.at_rig.repeats < ASKS {
             // A gauge that shows something else: the question comes again.
             self.at_rig.repeats += 1;
             return self.next_task(row, out);
@@ -512,7 +467,7 @@ impl Sequence {
             Some(Then::End) => self.finish(out, Outcome::Complete),
             _ if self.at_rig.disarmed => {
                 self.at_rig.disarmed = false;
-                self.arming = self.unarmed.afresh();
+                self.arming = self.arming.afresh(true);
                 self.stage = Stage::Arm;
             }
             _ => self.begin_next(row, out),

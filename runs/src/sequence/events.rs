@@ -255,10 +255,8 @@ impl Outcome {
             Outcome::NoContact { point } => format!("no contact at point {point}"),
             Outcome::LevelNotReached { quantity, wanted, found } => {
                 let at = AIR.iter().position(|(covariate, _)| covariate.name == quantity);
-                let words =
-                    |value: f64| at.map_or_else(|| format!("{quantity} {value}"), |at| shown(at, value));
-                let last =
-                    found.map_or_else(|| "nothing was read".into(), |found| format!("last {}", words(found)));
+                let words = |v: f64| at.map_or_else(|| format!("{quantity} {v}"), |at| shown(at, v));
+                let last = found.map_or("nothing was read".into(), |found| format!("last {}", words(found)));
                 format!("{} was not reached: {last}", words(*wanted))
             }
             Outcome::LoopLost => "nothing was heard of the loop".into(),

@@ -172,7 +172,7 @@ pub fn rehearse(
     let points = plan.points(seed, &setup.config.limits, &resolution)?;
     let mut sequence =
         Sequence::new(points, plan.file.pass, Arc::clone(&model), &setup.tip, setup.file.noise)
-            .in_air(setup.ambient())
+            .in_air(setup.file.stated_air())
             .at_rig(plan, setup);
     let [force, amplifier, stage] =
         VirtualRig::new(world, seed).map_err(|e| miette::miette!("the virtual rig: {e}"))?.split();

@@ -170,9 +170,7 @@ impl Keeper {
         pass: Option<&MeasuredPass>,
         news: &mut dyn FnMut(Update<'_>),
     ) -> miette::Result<()> {
-        for event in events {
-            news(Update::Event(event));
-        }
+        events.iter().for_each(|event| news(Update::Event(event)));
         if let Some(pass) = pass {
             self.dir.keep(pass)?;
             self.passes += 1;
@@ -248,14 +246,9 @@ impl Keeper {
 pub fn record<W: std::io::Write>(
     recorder: &mut realtime::recorder::Recorder<W>,
     at: Nanos,
-    events: &[crate::sequence::Event],
+    events: &[Event],
     pass: Option<&MeasuredPass>,
 ) -> miette::Result<()> {
-    for event in events {
-        recorder.event(at, event).into_diagnostic()?;
-    }
-    if let Some(pass) = pass {
-        recorder.pass(at, pass).into_diagnostic()?;
-    }
-    Ok(())
+    events.iter().try_for_each(|event| recorder.event(at, event)).into_diagnostic()?;
+    pass.map_or(Ok(()), |pass| recorder.pass(at, pass)).into_diagnostic()
 }

@@ -93,7 +93,7 @@ pub struct Snapshot {
 }
 
 /// Picks the cycles that become snapshots.
-#[derive(Debug)]
+#[derive(Debug, Default)]
 pub struct Snapshots {
     start_unix_ns: u64,
     period: Nanos,
@@ -105,13 +105,7 @@ pub struct Snapshots {
 impl Snapshots {
     /// Of a loop with such a period, whose record begins at `start_unix_ns`.
     pub fn of(start_unix_ns: u64, period: Nanos) -> Self {
-        Snapshots {
-            start_unix_ns,
-            period,
-            last: Nanos(0),
-            extremes: Extremes::default(),
-            deadlines: Deadlines::default(),
-        }
+        Snapshots { start_unix_ns, period, ..Snapshots::default() }
     }
 
     /// Takes a cycle; returns it where it is a snapshot.

@@ -169,7 +169,7 @@ fn who_touches(file: &SetupFile, tip: &Fingertip, wrong: &mut Problems<'_>) {
 /// A virtual rig serves its instruments itself: an address that something else may have is none of its.
 fn real_addresses(file: &SetupFile, wrong: &mut Problems<'_>) {
     use instruments::schema::LinkKind;
-    for (table, instrument) in super::profiles::all_of(file) {
+    for (table, instrument) in file.by_table() {
         let address = instrument.address.as_str();
         let Ok(profile) = instrument.description() else { continue };
         let served = match profile.description.link.kind {
@@ -181,9 +181,8 @@ fn real_addresses(file: &SetupFile, wrong: &mut Problems<'_>) {
             }
         };
         if !served {
-            let place = if table == "force" { vec![table] } else { vec![table, "address"] };
             wrong.add(
-                &place,
+                &super::profiles::place(table, "address"),
                 format!(
                     "[virtual], and `{}` at {address}, which the virtual rig does not serve",
                     instrument.profile

@@ -139,19 +139,11 @@ pub(super) fn all_of(
 
 /// Takes a reported value out of the file, so that the others are looked at.
 fn forget(file: &mut SetupFile, name: &str) {
-    match name {
-        "force" => file.force.iter_mut().for_each(|force| force.rate_hz = None),
-        "amplifier" => file.amplifier.rate_hz = None,
-        "stage" => file.stage.rate_hz = None,
-        "supply_relay" => file.supply_relay.iter_mut().for_each(|relay| relay.rate_hz = None),
-        "safety_inputs" => file.safety_inputs.iter_mut().for_each(|inputs| inputs.rate_hz = None),
-        name => {
-            let Ok(serde_json::Value::Object(mut limits)) = serde_json::to_value(&file.limits) else {
-                return;
-            };
-            limits.remove(name);
-            file.limits = serde_json::from_value(limits.into()).unwrap_or_default();
-        }
+    let instruments = file.by_table_mut();
+    instruments.into_iter().filter(|(table, _)| *table == name).for_each(|(_, one)| one.rate_hz = None);
+    let Ok(serde_json::Value::Object(mut limits)) = serde_json::to_value(&file.limits) else { return };
+    if limits.remove(name).is_some() {
+        file.limits = serde_json::from_value(limits.into()).unwrap_or_default();
     }
 }
 

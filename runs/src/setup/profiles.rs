@@ -55,39 +55,53 @@ pub(super) fn resolve(file: &mut SetupFile, folder: &Path) -> Vec<Problem> {
         name.clone_from(&stored.id);
         *source = Some(Arc::clone(stored));
     };
-    for instrument in &mut file.force {
-        one(&mut instrument.profile, &mut instrument.source, vec!["force"]);
+    for (table, instrument) in file.by_table_mut() {
+        one(&mut instrument.profile, &mut instrument.source, place(table, "profile"));
     }
-    let SetupFile { amplifier, stage, supply_relay, safety_inputs, chamber, vibrometer, .. } = file;
-    for (table, instrument) in [("amplifier", Some(amplifier)), ("stage", Some(stage))]
-        .into_iter()
-        .chain([("supply_relay", supply_relay.as_mut()), ("safety_inputs", safety_inputs.as_mut())])
-        .chain([("chamber", chamber.as_mut())])
-    {
-        if let Some(instrument) = instrument {
-            one(&mut instrument.profile, &mut instrument.source, vec![table, "profile"]);
-        }
+    if let Some(chamber) = &mut file.chamber {
+        one(&mut chamber.profile, &mut chamber.source, vec!["chamber", "profile"]);
     }
-    if let Some(vibrometer) = vibrometer {
+    if let Some(vibrometer) = &mut file.vibrometer {
         one(&mut vibrometer.profile, &mut vibrometer.source, vec!["vibrometer", "profile"]);
     }
     problems
 }
 
-/// The instruments of a setup with the table in which each stands.
-pub(super) fn all_of(file: &SetupFile) -> Vec<(&'static str, &InstrumentSetup)> {
-    let force = file.force.iter().map(|instrument| ("force", instrument));
-    let relay = file.supply_relay.iter().map(|instrument| ("supply_relay", instrument));
-    let inputs = file.safety_inputs.iter().map(|instrument| ("safety_inputs", instrument));
-    force.chain([("amplifier", &file.amplifier), ("stage", &file.stage)]).chain(relay).chain(inputs).collect()
+impl SetupFile {
+    /// Its instruments, each with the table in which it stands; the chamber, which takes no part in the loop,
+    /// is none of them.
+    pub fn by_table(&self) -> Vec<(&'static str, &InstrumentSetup)> {
+        let force = self.force.iter().map(|instrument| ("force", instrument));
+        let relay = self.supply_relay.iter().map(|instrument| ("supply_relay", instrument));
+        let inputs = self.safety_inputs.iter().map(|instrument| ("safety_inputs", instrument));
+        force
+            .chain([("amplifier", &self.amplifier), ("stage", &self.stage)])
+            .chain(relay)
+            .chain(inputs)
+            .collect()
+    }
+
+    /// The same, to be changed.
+    pub(super) fn by_table_mut(&mut self) -> Vec<(&'static str, &mut InstrumentSetup)> {
+        let SetupFile { force, amplifier, stage, supply_relay, safety_inputs, .. } = self;
+        let force = force.iter_mut().map(|instrument| ("force", instrument));
+        let relay = supply_relay.iter_mut().map(|instrument| ("supply_relay", instrument));
+        let inputs = safety_inputs.iter_mut().map(|instrument| ("safety_inputs", instrument));
+        force.chain([("amplifier", amplifier), ("stage", stage)]).chain(relay).chain(inputs).collect()
+    }
+}
+
+/// The key of an instrument in its table; sensors of force have a list of tables, without places.
+pub(super) fn place(table: &'static str, key: &'static str) -> Vec<&'static str> {
+    if table == "force" { vec![table] } else { vec![table, key] }
 }
 
 /// Whether every instrument can be what the setup names it for, on the line that the setup states: all that do not.
 pub(super) fn fit(file: &SetupFile) -> Vec<Problem> {
-    let all = all_of(file);
+    let all = file.by_table();
     let mut problems = Vec::new();
     for &(table, instrument) in &all {
-        let place = |key: &'static str| if table == "force" { vec![table] } else { vec![table, key] };
+        let place = |key| place(table, key);
         if let Err((key, problem)) = one_fits(table, instrument) {
             let problem = format!("instrument `{}` at {}: {problem}", instrument.profile, instrument.address);
             problems.push((place(key), problem));
@@ -138,7 +152,7 @@ fn twice(all: &[(&'static str, &InstrumentSetup)]) -> Vec<Problem> {
                 "`{first}` and `{}` are both at {address}, {number}: correct an `address`, or give one another `unit`",
                 instrument.profile
             );
-            problems.push((if *table == "force" { vec!["force"] } else { vec![*table, "address"] }, problem));
+            problems.push((self::place(table, "address"), problem));
         }
     }
     problems
@@ -164,31 +178,26 @@ fn share_lines(all: &[(&'static str, &InstrumentSetup)]) -> Result<(), Problem> 
         }
     }
     for (path, shared) in lines.into_iter().filter(|(_, shared)| shared.len() > 1) {
-        let place = |table: &'static str| if table == "force" { vec![table] } else { vec![table, "address"] };
         let mut share = 0.0;
         for (table, instrument, rtu) in shared {
-            let profile = instrument.description().map_err(|error| (place(table), error.to_string()))?;
+            let profile =
+                instrument.description().map_err(|error| (place(table, "address"), error.to_string()))?;
             let problem = if !rtu || profile.description.stream.is_some() {
                 "only units of Modbus RTU that are polled can share a line"
             } else if !matches!(table, "force" | "safety_inputs") {
                 "what takes set-points needs a line of its own: another unit's silence would hold up an 'off'"
             } else {
-                let setup = LineSetup {
-                    over_rtu: true,
-                    baud: instrument.baud,
-                    rate_hz: instrument.rate_hz,
-                    ..LineSetup::default()
-                };
-                share += profile.line_share(setup).unwrap_or(0.0);
+                let line = LineSetup { over_rtu: true, ..line_of(instrument) };
+                share += profile.line_share(line).unwrap_or(0.0);
                 continue;
             };
-            return Err((place(table), format!("`{}` at {}: {problem}", instrument.profile, path.display())));
+            let problem = format!("`{}` at {}: {problem}", instrument.profile, path.display());
+            return Err((place(table, "address"), problem));
         }
         if share > 1.0 {
+            let (path, taken) = (path.display(), share * 1e2);
             let problem = format!(
-                "the units at {} take {:.0} % of its capacity together; state a lower `rate_hz`",
-                path.display(),
-                share * 1e2
+                "the units at {path} take {taken:.0} % of its capacity together; state a lower `rate_hz`"
             );
             return Err((vec!["force"], problem));
         }
@@ -196,15 +205,19 @@ fn share_lines(all: &[(&'static str, &InstrumentSetup)]) -> Result<(), Problem> 
     Ok(())
 }
 
-/// Roles, signals and set-points, then the line's capacity; with the key that is to blame.
-fn one_fits(table: &str, instrument: &InstrumentSetup) -> Result<(), (&'static str, String)> {
-    let profile = instrument.description().map_err(|error| ("profile", error.to_string()))?;
-    let line = LineSetup {
+fn line_of(instrument: &InstrumentSetup) -> LineSetup {
+    LineSetup {
         over_rtu: instrument.address.starts_with("rtu:"),
         over_tcp: instrument.address.starts_with("tcp:"),
         baud: instrument.baud,
         rate_hz: instrument.rate_hz,
-    };
+    }
+}
+
+/// Roles, signals and set-points, then the line's capacity; with the key that is to blame.
+fn one_fits(table: &str, instrument: &InstrumentSetup) -> Result<(), (&'static str, String)> {
+    let profile = instrument.description().map_err(|error| ("profile", error.to_string()))?;
+    let line = line_of(instrument);
     if line.over_tcp && profile.description.link.kind != LinkKind::Serial {
         return Err(("address", "`tcp:` is for serial lines behind a device server; leave it out".into()));
     }
@@ -217,24 +230,15 @@ fn one_fits(table: &str, instrument: &InstrumentSetup) -> Result<(), (&'static s
         _ => Endpoint::contacts(profile, instrument).map(drop),
     }
     .map_err(|problem| ("profile", problem.to_string()))?;
-    match share {
-        Some(share) if share > 1.0 => Err((
-            if instrument.rate_hz.is_some() { "rate_hz" } else { "profile" },
-            format!(
-                "its samples take {:.0} % of the line's capacity; state a lower `rate_hz` or a higher `baud`",
-                share * 1e2
-            ),
-        )),
-        _ => Ok(()),
-    }
+    let Some(share) = share.filter(|share| *share > 1.0) else { return Ok(()) };
+    let problem = format!(
+        "its samples take {:.0} % of the line's capacity; state a lower `rate_hz` or a higher `baud`",
+        share * 1e2
+    );
+    Err((if instrument.rate_hz.is_some() { "rate_hz" } else { "profile" }, problem))
 }
 
 impl Setup {
-    /// Its instruments, each with the table in which it stands.
-    pub fn by_table(&self) -> Vec<(&'static str, &InstrumentSetup)> {
-        all_of(&self.file)
-    }
-
     /// Whether the force instruments together give each axis once, as a run needs it; a look at one instrument does not.
     ///
     /// # Errors

@@ -46,15 +46,8 @@ impl VirtualLoop {
     pub fn cycle_at(&mut self, now: Nanos, lateness: Nanos) -> Row {
         self.number += 1;
         let tick = Tick { number: self.number, lateness, now };
-        let queue = &mut self.queue;
-        let row = turn(
-            &self.config,
-            &*self.model,
-            &mut self.state,
-            &mut self.ports,
-            &mut || queue.pop_front(),
-            tick,
-        );
+        let VirtualLoop { config, model, ports, state, queue, .. } = self;
+        let row = turn(config, &**model, state, ports, &mut || queue.pop_front(), tick);
         self.last = Some(row);
         row
     }

@@ -3,20 +3,18 @@
 
 use crate::input::parse_toml;
 use crate::plan::PlanFile;
-use crate::run_dir::records_in;
+use crate::run_dir::{open_record, records_in};
 use crate::session::{REPLAYABLE, Replayable};
 use diagnosis::timing::{Against, Edge, RecordPart, judge};
-use miette::{IntoDiagnostic, WrapErr};
+use miette::IntoDiagnostic;
 use models::condition::Condition;
 use models::finger::Finger;
 use models::prediction::SpringSlider;
 use models::quantity::PeakToPeak;
 use realtime::ports::{Nanos, Quality};
-use realtime::recorder::{self, Entry, Reader};
+use realtime::recorder::{self, Entry};
 use realtime::turn::Row;
 use std::collections::VecDeque;
-use std::fs::File;
-use std::io::BufReader;
 use std::path::Path;
 
 /// Time before an edge over which nothing else may change: samples that are stamped late by up to 0.1 s
@@ -121,14 +119,9 @@ fn edge(against: Against, since: Nanos, rows: &[Row]) -> Option<Edge> {
         ..Condition::paper()
     };
     // An amplifier that reads no amplitude back shows no instant of a step.
-    let complete = against == Against::Position || !amplitude.is_empty();
-    (complete && !velocity.is_empty() && condition.normal_force_n > 0.0).then_some(Edge {
-        against,
-        condition,
-        lateral,
-        amplitude,
-        velocity,
-    })
+    let shown = against == Against::Position || !amplitude.is_empty();
+    let complete = shown && !velocity.is_empty() && condition.normal_force_n > 0.0;
+    complete.then_some(Edge { against, condition, lateral, amplitude, velocity })
 }
 
 /// Whether a plan's text asks for no edge.
@@ -145,8 +138,7 @@ pub fn of_run(folder: &Path, finger: Finger) -> miette::Result<RecordPart> {
     let mut found = Collector::default();
     let mut stated = None;
     for path in records_in(folder)? {
-        let file = File::open(&path).into_diagnostic().wrap_err_with(|| path.display().to_string())?;
-        for entry in Reader::new(BufReader::new(file)).only(recorder::CYCLES) {
+        for entry in open_record(&path, recorder::CYCLES)? {
             match entry {
                 Entry::Message { text, .. } => {
                     serde_json::from_slice::<Row>(&text).iter().for_each(|row| found.row(row));

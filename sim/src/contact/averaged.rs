@@ -79,11 +79,7 @@ impl Averager {
         }
         let ln = variables(contact);
         let key = ln.map(|x| (x / CELL).round() as i64);
-        let mut rest = *contact;
-        rest.sine_amplitude_m = 1.0;
-        rest.speed_m_s = 1.0;
-        rest.normal_force_n = 1.0;
-        rest.friction = 1.0;
+        let rest = with(contact, [0.0; SLOPES]);
         let mixed = key
             .iter()
             .fold(0_u64, |h, k| (h ^ (*k as u64)).wrapping_mul(0x9e37_79b9_7f4a_7c15).rotate_left(29));

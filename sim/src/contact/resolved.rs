@@ -35,8 +35,6 @@ pub struct Resolved {
     pub steady: Steady,
     /// Mean normal force over the averaged cycles (N): how well the balance was met.
     pub normal_force_n: f64,
-    /// Static compression (m).
-    pub preload_m: f64,
 }
 
 /// Lightest ridge marched (kg): lighter ones move as if they had this mass.
@@ -81,7 +79,6 @@ pub fn steady(contact: &Contact, settings: Settings) -> Resolved {
     Resolved {
         steady: Steady { lateral_force_n: lateral / n, contact_fraction: touching / n },
         normal_force_n: normal / n,
-        preload_m: march.preload_m,
     }
 }
 

@@ -30,7 +30,7 @@ struct Pass {
 pub fn steady(contact: &Contact) -> Steady {
     let heights: &[f64] = if contact.ridge.height_sd_m > 0.0 { &HEIGHTS } else { &[0.0] };
     let preload = preload_m(contact, heights);
-    let mut sum = Steady { lateral_force_n: 0.0, contact_fraction: 0.0 };
+    let mut sum = Steady::NONE;
     let share = 1.0 / heights.len() as f64;
     for height in heights {
         let pass = periodic(contact, preload + height * contact.ridge.height_sd_m);

@@ -25,19 +25,14 @@ pub enum DefectsError {
     /// Not TOML, or a key or value that has no place there.
     #[error("{0}")]
     Toml(#[from] toml::de::Error),
-    /// No such kind of defect.
     #[error("line {line}: no defect is called '{name}'; known: {known}")]
     UnknownKind { line: usize, name: String, known: String },
-    /// A parameter the defect does not have.
     #[error("line {line}: '{defect}' has no parameter '{parameter}'; it has: {known}")]
     UnknownParameter { line: usize, defect: &'static str, parameter: String, known: String },
-    /// A parameter that is missing, without a seed to draw it from.
     #[error("line {line}: '{defect}' needs its parameter '{parameter}' (or a seed to draw it from)")]
     MissingParameter { line: usize, defect: &'static str, parameter: &'static str },
-    /// Two defects that this world cannot solve at once.
     #[error("line {line}: '{one}' and '{other}' cannot act together in this world; leave one out")]
     Together { line: usize, one: &'static str, other: &'static str },
-    /// A number that cannot be.
     #[error("line {line}: '{parameter}' is {value}; a finite number is needed")]
     NotFinite { line: usize, parameter: String, value: f64 },
 }
@@ -72,7 +67,12 @@ impl Defects {
     /// An unknown name.
     pub fn sealed(name: &str, seed: u64) -> Result<Self, DefectsError> {
         let kind = DefectKind::named(name).ok_or_else(|| unknown(1, name))?;
-        Ok(Self { defects: vec![drawn(kind, seed)], channels: Vec::new() })
+        Ok(Self::one(kind, drawn(kind, seed)))
+    }
+
+    /// One defect.
+    pub fn one(kind: &'static DefectKind, values: Values) -> Self {
+        Self { defects: vec![Defect { kind, values }], channels: Vec::new() }
     }
 
     /// Reads a defects file's text.
@@ -110,24 +110,19 @@ impl Defects {
             let at = line(entry.name.span().start);
             let name = entry.name.get_ref();
             let kind = DefectKind::named(name).ok_or_else(|| unknown(at, name))?;
-            let mut defect = drawn(kind, entry.seed.unwrap_or(0));
+            let mut values = drawn(kind, entry.seed.unwrap_or(0));
             let mut given = [false; 4];
             for (parameter, value) in &entry.parameters {
-                let at = line(value.span().start);
-                let known = || kind.parameters.iter().map(|p| p.name).collect::<Vec<_>>().join(", ");
-                let index = kind.parameters.iter().position(|p| p.name == parameter).ok_or_else(|| {
-                    DefectsError::UnknownParameter {
-                        line: at,
-                        defect: kind.name,
-                        parameter: parameter.clone(),
-                        known: known(),
-                    }
-                })?;
-                let value = *value.get_ref();
+                let (line, value) = (line(value.span().start), *value.get_ref());
+                let (defect, parameter) = (kind.name, parameter.clone());
+                let Some(index) = kind.parameters.iter().position(|p| p.name == parameter) else {
+                    let known = kind.parameters.iter().map(|p| p.name).collect::<Vec<_>>().join(", ");
+                    return Err(DefectsError::UnknownParameter { line, defect, parameter, known });
+                };
                 if !value.is_finite() {
-                    return Err(DefectsError::NotFinite { line: at, parameter: parameter.clone(), value });
+                    return Err(DefectsError::NotFinite { line, parameter, value });
                 }
-                defect.values[index] = value;
+                values[index] = value;
                 given[index] = true;
             }
             if entry.seed.is_none()
@@ -139,11 +134,10 @@ impl Defects {
             if let Some(clash) = defects.iter().find(|d: &&Defect| !super::compatible(d.kind, kind)) {
                 return Err(DefectsError::Together { line: at, one: clash.kind.name, other: kind.name });
             }
-            defects.push(defect);
+            defects.push(Defect { kind, values });
         }
-        let mut channels = Vec::with_capacity(file.channel.len());
         for entry in &file.channel {
-            let fault = *entry.get_ref();
+            let fault = entry.get_ref();
             let numbers =
                 [("from_s", Some(fault.from_s)), ("until_s", fault.until_s), ("strength", fault.strength)];
             for (parameter, value) in numbers {
@@ -152,8 +146,8 @@ impl Defects {
                     return Err(DefectsError::NotFinite { line, parameter, value });
                 }
             }
-            channels.push(fault);
         }
+        let channels = file.channel.into_iter().map(toml::Spanned::into_inner).collect();
         Ok(Self { defects, channels })
     }
 
@@ -175,9 +169,8 @@ impl Defects {
     }
 }
 
-fn drawn(kind: &'static DefectKind, seed: u64) -> Defect {
-    let values: Values = kind.draw(&mut Noise::new(seed, kind.name));
-    Defect { kind, values }
+fn drawn(kind: &DefectKind, seed: u64) -> Values {
+    kind.draw(&mut Noise::new(seed, kind.name))
 }
 
 fn unknown(line: usize, name: &str) -> DefectsError {

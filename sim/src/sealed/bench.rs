@@ -164,8 +164,7 @@ impl Bench {
             for _ in 0..HALVINGS {
                 let share = 0.5 * (small + large);
                 kind.resize(&mut values, share);
-                let defects = Defects { defects: vec![Defect { kind, values }], channels: Vec::new() };
-                let data = self.noise_free(points, &defects);
+                let data = self.noise_free(points, &Defects::one(kind, values));
                 let chi2 = self.case(&data).fit(&Defects::none(), 5).chi2;
                 let gap = (chi2 / points.len() as f64).sqrt();
                 let miss = (gap / target).ln().abs();

@@ -5,6 +5,7 @@
 //! and shapes together; and for expensive causes all this on a part of the passes first, the whole table if
 //! that comes near.
 
+use super::bench::NoiseFree;
 use super::form::{Kernel, solved};
 use super::oracle::{Case, Fit, NUISANCES, moved};
 use crate::defects::{ALL, Defect, DefectKind, Defects, Draw, Parameter, Values, compatible};
@@ -85,16 +86,8 @@ fn lowest(p: &Parameter) -> f64 {
     if matches!(p.draw, Draw::Signed | Draw::Factor) { -1.0 } else { 0.0 }
 }
 
-fn with(kind: &'static DefectKind, values: Values) -> Defects {
-    Defects { defects: vec![Defect { kind, values }], channels: Vec::new() }
-}
-
 fn values_of(kind: &DefectKind, x: &[f64; UNKNOWNS]) -> Values {
-    let mut values = Values::default();
-    for (i, p) in kind.parameters.iter().enumerate() {
-        values[i] = value(p, x[NUISANCES + i]);
-    }
-    values
+    std::array::from_fn(|i| kind.parameters.get(i).map_or(0.0, |p| value(p, x[NUISANCES + i])))
 }
 
 fn theta(x: &[f64; UNKNOWNS]) -> [f64; NUISANCES] {
@@ -115,7 +108,7 @@ impl Case<'_> {
     /// `whole`.
     pub fn imitators(&self, truth: &[Defect], base: &Fit, truth_chi2: f64, whole: bool) -> Vec<Imitator> {
         let part = self.part(base);
-        let thinned = part.case(self);
+        let thinned = Case { known: &part.known, lateral_n: &part.lateral_n, sd_n: &part.sd_n, ..*self };
         let thinned_base = thinned.fit_from(&base.finger, &Defects::none(), 4);
         let gap = (base.chi2 - truth_chi2).max(1e-9);
         let thinned_gap = thinned_base.chi2 - truth_chi2;
@@ -140,7 +133,7 @@ impl Case<'_> {
             // One of several true causes: no worse than from its own size and shapes, with the stiffnesses as
             // the recalibrated baseline has them, and as this cause alone would have them.
             if let Some(own) = truth.iter().find(|d| d.kind.name == kind.name) {
-                let alone = self.fit_from(&self.nominal, &with(kind, own.values), STEPS);
+                let alone = self.fit_from(&self.nominal, &Defects::one(kind, own.values), STEPS);
                 for start in [base, &alone] {
                     let own = self.search(kind, self.state(own, start), truth_chi2, near);
                     if own.chi2 < state.chi2 || !state.chi2.is_finite() {
@@ -179,14 +172,14 @@ impl Case<'_> {
 
     /// A part of the passes that holds the gap in proportion: every so many of them in the order of what the
     /// baseline leaves, each counting for as many.
-    fn part(&self, base: &Fit) -> Part {
+    fn part(&self, base: &Fit) -> NoiseFree {
         let mut order: Vec<usize> = (0..self.known.len()).collect();
         let size = |i: usize| (base.residual_n[i] / self.sd_n[i]).abs();
         order.sort_by(|a, b| size(*a).total_cmp(&size(*b)));
         let every = order.len().div_ceil(PART).max(1);
         let thinned: Vec<usize> = order.iter().copied().skip(every / 2).step_by(every).collect();
         let weight = (thinned.len() as f64 / order.len() as f64).sqrt();
-        Part {
+        NoiseFree {
             known: thinned.iter().map(|i| self.known[*i]).collect(),
             lateral_n: thinned.iter().map(|i| self.lateral_n[*i]).collect(),
             sd_n: thinned.iter().map(|i| self.sd_n[*i] * weight).collect(),
@@ -216,7 +209,8 @@ impl Case<'_> {
             let mut best = (f64::INFINITY, values);
             for rung in 0..rungs {
                 kind.resize(&mut values, (rung as f64 + 0.5) / rungs as f64);
-                let left = self.left(&jacobian, &self.predict(&base.finger, &with(kind, values)), start);
+                let left =
+                    self.left(&jacobian, &self.predict(&base.finger, &Defects::one(kind, values)), start);
                 if left < best.0 {
                     best = (left, values);
                 }
@@ -299,7 +293,7 @@ impl Case<'_> {
     }
 
     fn run(&self, kind: &'static DefectKind, x: &[f64; UNKNOWNS]) -> Vec<f64> {
-        self.predict(&moved(&self.nominal, theta(x)), &with(kind, values_of(kind, x)))
+        self.predict(&moved(&self.nominal, theta(x)), &Defects::one(kind, values_of(kind, x)))
     }
 
     /// Derivatives of the model in standard deviations.
@@ -422,27 +416,6 @@ fn bounded_step(
     next
 }
 
-/// Some passes of a case.
-struct Part {
-    known: Vec<crate::world::Point>,
-    lateral_n: Vec<f64>,
-    sd_n: Vec<f64>,
-}
-
-impl Part {
-    fn case<'a>(&'a self, whole: &Case<'a>) -> Case<'a> {
-        Case {
-            known: &self.known,
-            lateral_n: &self.lateral_n,
-            sd_n: &self.sd_n,
-            nominal: whole.nominal,
-            stiffness_sd: whole.stiffness_sd,
-            beside: whole.beside,
-            place: whole.place,
-        }
-    }
-}
-
 #[cfg(test)]
 mod tests {
     use super::*;
@@ -468,14 +441,15 @@ mod tests {
             let truth = DefectKind::named(name).unwrap();
             let mut values = truth.draw(&mut noise);
             truth.resize(&mut values, 0.7);
-            let data = bench.noise_free(&points, &with(truth, values));
+            let data = bench.noise_free(&points, &Defects::one(truth, values));
             let case = bench.case(&data);
             let base = case.fit(&Defects::none(), 8);
             let found = case.imitators(&[Defect { kind: truth, values }], &base, 0.0, false);
             for imitator in found.iter().filter(|i| !DEAR.contains(&i.name.as_str())) {
                 let kind = DefectKind::named(&imitator.name).unwrap();
                 // The best rung with its nuisances refitted in full: the result of a ladder alone.
-                let rung = case.fit(&with(kind, case.ladder(kind, &base)[0].1), 3).chi2.min(base.chi2);
+                let rung =
+                    case.fit(&Defects::one(kind, case.ladder(kind, &base)[0].1), 3).chi2.min(base.chi2);
                 // Where not even that mends a quarter of the gap no search follows, and the rung counts to first order.
                 if rung < 0.75 * base.chi2 {
                     assert!(imitator.chi2_left <= 1.001 * rung + 1e-6, "{name}: {rung} {imitator:?}");

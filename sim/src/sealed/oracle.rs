@@ -74,9 +74,7 @@ impl Case<'_> {
     }
 
     pub(super) fn chi2(&self, model: &[f64], theta: [f64; NUISANCES]) -> f64 {
-        let data: f64 =
-            self.lateral_n.iter().zip(model).zip(self.sd_n).map(|((y, m), sd)| ((y - m) / sd).powi(2)).sum();
-        data + self.prior(theta)
+        self.standardised(model).into_iter().map(|z| z.powi(2)).sum::<f64>() + self.prior(theta)
     }
 
     /// What the stiffnesses' shifts cost.
@@ -176,11 +174,10 @@ impl Case<'_> {
         theta: [f64; NUISANCES],
     ) -> f64 {
         let Some(step) = self.gauss_newton(jacobian, model, theta) else { return self.chi2(model, theta) };
-        let residual =
-            self.lateral_n.iter().zip(model).zip(self.sd_n).enumerate().map(|(i, ((y, m), sd))| {
-                let shift: f64 = (0..NUISANCES).map(|k| jacobian[k][i] * step[k]).sum();
-                ((y - m) / sd - shift).powi(2)
-            });
+        let residual = self.standardised(model).into_iter().enumerate().map(|(i, z)| {
+            let shift: f64 = (0..NUISANCES).map(|k| jacobian[k][i] * step[k]).sum();
+            (z - shift).powi(2)
+        });
         let prior: f64 = (0..2).map(|k| ((theta[k] + step[k]) / self.stiffness_sd).powi(2)).sum();
         residual.sum::<f64>() + prior
     }

@@ -5,7 +5,7 @@ use super::drive::Drive;
 use super::{Service, SharedPlant};
 use instruments::FrameId;
 use instruments::bus::{CanEvent, CanPort};
-use instruments::codec::can::{CanFrame, SlcanMessage, SlcanReader, slcan_line};
+use instruments::codec::can::{CanFrame, SlcanReader, slcan_line};
 use instruments::profile::{FrameKind, Part};
 use instruments::schema::LinkKind;
 use realtime::ports::Nanos;
@@ -57,12 +57,7 @@ impl CanPort for EmulatedAdapter {
             self.port.set_timeout(left)?;
             match self.port.read(&mut buffer) {
                 Ok(count) => {
-                    let waiting = &mut self.waiting;
-                    self.reader.push(&buffer[..count], |message| {
-                        if let SlcanMessage::Frame(frame) = message {
-                            waiting.push_back(frame);
-                        }
-                    });
+                    self.reader.push(&buffer[..count], |frame| self.waiting.push_back(frame));
                 }
                 Err(_) if Instant::now() >= deadline => return Ok(None),
                 // Nobody holds the other end open just now.
@@ -109,23 +104,17 @@ impl CanEmulator {
     }
 }
 
-/// A group of messages that comes by itself.
-struct Broadcast {
+/// A group of messages, sent on request or by itself.
+struct Group {
     frame: FrameId,
     parts: Vec<Part>,
+    request: Option<Vec<u8>>,
     period: u64,
     due: Nanos,
 }
 
-/// A group of messages that is sent on request.
-struct OnRequest {
-    frame: FrameId,
-    parts: Vec<Part>,
-    request: Vec<u8>,
-}
-
 enum Instrument {
-    Plain { device: Box<Device>, base: u32, broadcasts: Vec<Broadcast>, on_request: Vec<OnRequest> },
+    Plain { device: Box<Device>, base: u32, groups: Vec<Group> },
     Drive(Box<Drive>),
 }
 
@@ -136,26 +125,23 @@ impl Instrument {
         if profile.description.link.kind == LinkKind::Canopen {
             return Self::Drive(Box::new(Drive::new(device, u8::try_from(base).unwrap_or(1))));
         }
-        let (mut broadcasts, mut on_request) = (Vec::new(), Vec::new());
+        let mut groups = Vec::new();
         for (index, frame) in profile.frames().iter().enumerate() {
             let FrameKind::Messages(group, parts) = &frame.kind else { continue };
             let message = &profile.description.message[*group];
-            let (frame, parts) = (FrameId(index), parts.clone());
-            match &message.request {
-                Some(request) => on_request.push(OnRequest { frame, parts, request: request.clone() }),
-                None => {
-                    let period = Nanos::from_seconds(1.0 / message.rate_hz).0.max(1);
-                    broadcasts.push(Broadcast { frame, parts, period, due: Nanos(0) });
-                }
-            }
+            let period = Nanos::from_seconds(1.0 / message.rate_hz).0.max(1);
+            let (frame, parts, request) = (FrameId(index), parts.clone(), message.request.clone());
+            groups.push(Group { frame, parts, request, period, due: Nanos(0) });
         }
-        Self::Plain { device: Box::new(device), base, broadcasts, on_request }
+        Self::Plain { device: Box::new(device), base, groups }
     }
 
     /// When the instrument has something to say by itself.
     fn due(&self) -> Option<Nanos> {
         match self {
-            Self::Plain { broadcasts, .. } => broadcasts.iter().map(|one| one.due).min(),
+            Self::Plain { groups, .. } => {
+                groups.iter().filter(|group| group.request.is_none()).map(|group| group.due).min()
+            }
             Self::Drive(drive) => drive.due(),
         }
     }
@@ -191,19 +177,20 @@ impl Bus {
             let (mut plant, now) = self.plant.now();
             for instrument in &mut self.instruments {
                 match instrument {
-                    Instrument::Plain { device, base, broadcasts, on_request } => {
+                    Instrument::Plain { device, base, groups } => {
+                        let asks = |data: &[u8]| groups.iter().find(|g| g.request.as_deref() == Some(data));
                         if let Some(CanEvent::Frame(frame, _)) = heard
                             && frame.id == *base
-                            && let Some(group) = on_request.iter().find(|group| group.request == frame.data())
+                            && let Some(group) = asks(frame.data())
                         {
                             let bytes = device.frame(group.frame, &mut *plant, now);
                             out.extend(split(*base, &group.parts, &bytes));
                         }
-                        for broadcast in broadcasts.iter_mut().filter(|one| one.due <= now) {
-                            let bytes = device.frame(broadcast.frame, &mut *plant, now);
-                            out.extend(split(*base, &broadcast.parts, &bytes));
-                            let missed = now.since(broadcast.due).0 / broadcast.period;
-                            broadcast.due = Nanos(broadcast.due.0 + (missed + 1) * broadcast.period);
+                        for group in groups.iter_mut().filter(|g| g.request.is_none() && g.due <= now) {
+                            let bytes = device.frame(group.frame, &mut *plant, now);
+                            out.extend(split(*base, &group.parts, &bytes));
+                            let missed = now.since(group.due).0 / group.period;
+                            group.due = Nanos(group.due.0 + (missed + 1) * group.period);
                         }
                     }
                     Instrument::Drive(drive) => {

@@ -62,46 +62,27 @@ impl Device {
             quantity: quantity.into(),
             known: known.join(", "),
         };
-        let mut sources = Vec::with_capacity(d.signal.len());
-        for signal in &d.signal {
+        let source = |(index, signal): (usize, &instruments::schema::Signal)| {
             let name = signal.name.as_ref();
-            sources.push(if let Some(raw) = d.emulator.constant.get(name) {
-                Some(Source::Constant(*raw))
-            } else if let Some(quantity) = d.emulator.measure.get(name) {
-                let quantity = Quantity::from_name(quantity)
-                    .ok_or_else(|| unknown(quantity, Quantity::ALL.iter().map(|q| q.name()).collect()))?;
-                // Counters and clocks run round at the width of their register.
-                let index = SignalId(sources.len());
-                let (counts, _) = profile.turn(index);
-                let wraps = matches!(
-                    quantity,
-                    Quantity::ForceSample
-                        | Quantity::ForceTime
-                        | Quantity::DriveCount
-                        | Quantity::DriveTime
-                        | Quantity::StageCount
-                        | Quantity::StageTime
-                        | Quantity::DeviceTime
-                        | Quantity::DeviceReads
-                        | Quantity::Heartbeat
-                );
-                let modulo = if wraps { counts * signal.scale } else { f64::INFINITY };
-                Some(Source::World { quantity, per_si: 1.0 / signal.si.factor, offset: 0.0, modulo })
-            } else {
-                None
-            });
-        }
-        let mut commands = Vec::with_capacity(d.set.len());
-        for set in &d.set {
-            commands.push(match d.emulator.command.get(set.name.as_ref()) {
-                Some(name) => {
-                    let known = || Command::ALL.iter().map(|c| c.name()).collect();
-                    let command = Command::from_name(name).ok_or_else(|| unknown(name, known()))?;
-                    Some((command, set.si.factor))
-                }
-                None => None,
-            });
-        }
+            if let Some(raw) = d.emulator.constant.get(name) {
+                return Ok(Some(Source::Constant(*raw)));
+            }
+            let Some(quantity) = d.emulator.measure.get(name) else { return Ok(None) };
+            let known = || Quantity::ALL.iter().map(|q| q.name()).collect();
+            let quantity = Quantity::from_name(quantity).ok_or_else(|| unknown(quantity, known()))?;
+            // Counters and clocks run round at the width of their register.
+            let turn = profile.turn(SignalId(index)).0 * signal.scale;
+            let modulo = if quantity.wraps() { turn } else { f64::INFINITY };
+            Ok(Some(Source::World { quantity, per_si: 1.0 / signal.si.factor, offset: 0.0, modulo }))
+        };
+        let sources = d.signal.iter().enumerate().map(source).collect::<Result<Vec<_>, _>>()?;
+        let command = |set: &instruments::schema::Set| {
+            let Some(name) = d.emulator.command.get(set.name.as_ref()) else { return Ok(None) };
+            let known = || Command::ALL.iter().map(|c| c.name()).collect();
+            let command = Command::from_name(name).ok_or_else(|| unknown(name, known()))?;
+            Ok(Some((command, set.si.factor)))
+        };
+        let commands = d.set.iter().map(command).collect::<Result<Vec<_>, _>>()?;
         let blocks = d.write.iter().map(|block| vec![0; 2 * usize::from(block.count)]).collect();
         let mut constants = profile.values();
         for frame in (0..profile.frames().len()).map(FrameId) {

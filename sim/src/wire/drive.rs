@@ -67,12 +67,11 @@ impl Drive {
     }
 
     fn process_data(&self) -> Option<(FrameId, u32)> {
-        let frames = self.device.profile().frames().iter().enumerate();
-        let found = frames.filter_map(|(i, frame)| match &frame.kind {
+        let mut frames = self.device.profile().frames().iter().enumerate();
+        frames.find_map(|(i, frame)| match &frame.kind {
             FrameKind::Messages(_, parts) => Some((FrameId(i), parts.first()?.id)),
             _ => None,
-        });
-        found.into_iter().next()
+        })
     }
 
     /// What it says by itself: heartbeat, process data, and an emergency where its guard trips.
@@ -149,10 +148,8 @@ impl Drive {
     /// A set-point of the process data, in SI units.
     fn set_point(&self, name: &str, data: &[u8]) -> f64 {
         let profile = self.device.profile();
-        let value = profile.set(name).and_then(|set: SetId| {
-            Some(profile.decode_set(set, data)? * profile.description.set[set.0].si.factor)
-        });
-        value.unwrap_or(0.0)
+        let si = |set: SetId| Some(profile.decode_set(set, data)? * profile.description.set[set.0].si.factor);
+        profile.set(name).and_then(si).unwrap_or(0.0)
     }
 
     fn obey(&mut self, control: u16, plant: &mut dyn Plant) {
@@ -186,31 +183,22 @@ impl Drive {
                 }
             }
             SdoRequest::Write(index, sub, bytes, value) => {
-                let known = match (index, sub) {
+                let mut answer = SdoAnswer::Written;
+                match (index, sub) {
                     (0x6040, 0) => {
                         self.heard_at = now;
                         // an object of 16 bits
                         self.obey(value as u16, plant);
-                        true
                     }
                     // Some drives refuse a change of mode while halted (ros_canopen issue 328).
                     (0x6060, 0) if self.control & 0x0100 != 0 => {
                         return reply(index, sub, 1, SdoAnswer::Aborted(0x0800_0022));
                     }
-                    (0x6060, 0) => {
-                        // an object of 8 bits
-                        {
-                            self.mode = value as u8;
-                        }
-                        true
-                    }
-                    (0x6083 | 0x6084, 0) => {
-                        self.objects.insert((index, sub), (4, value));
-                        true
-                    }
-                    _ => false,
-                };
-                let answer = if known { SdoAnswer::Written } else { SdoAnswer::Aborted(0x0601_0002) };
+                    // an object of 8 bits
+                    (0x6060, 0) => self.mode = value as u8,
+                    (0x6083 | 0x6084, 0) => drop(self.objects.insert((index, sub), (4, value))),
+                    _ => answer = SdoAnswer::Aborted(0x0601_0002),
+                }
                 reply(index, sub, bytes, answer)
             }
         }

@@ -53,14 +53,7 @@ impl LineInstrument {
     }
 
     fn end(&self) -> Vec<u8> {
-        self.device
-            .profile()
-            .description
-            .link
-            .rx_terminator
-            .clone()
-            .unwrap_or_else(|| "\n".into())
-            .into_bytes()
+        self.device.profile().description.link.rx_end().into()
     }
 
     /// The answer to one line; empty where there is none.
@@ -88,17 +81,12 @@ impl LineInstrument {
             return Answer::Line(status);
         }
         if let Some(init) = description.init.iter().find(|init| init.send.as_deref() == Some(line)) {
-            return init
-                .expect
-                .as_ref()
-                .and_then(|all| all.first())
-                .map_or(Answer::Nothing, |start| Answer::Line(start.clone()));
+            return Answer::of(init.expect.as_ref().and_then(|all| all.first()).cloned());
         }
         if let Some(choice) = &description.link.choice
             && let Some(which) = number_in(&choice.ask, line)
         {
-            let name = description.emulator.names.get(which);
-            return name.map_or(Answer::Nothing, |name| Answer::Line(name.clone()));
+            return Answer::of(description.emulator.names.get(which).cloned());
         }
         if let Some((frame, index, which)) = self.query(line) {
             let query = &description.query[index];
@@ -118,14 +106,14 @@ impl LineInstrument {
                 for (set, value) in heard {
                     self.error |= self.device.set(set, value, plant).is_err();
                 }
-                answer.map_or(Answer::Nothing, Answer::Line)
+                Answer::of(answer)
             }
             None => {
                 self.error = true;
                 let unknown = self.device.profile().description.link.unsolicited.last().cloned();
                 let zeros =
                     |alarm: String| Pattern::parse(&alarm).map_or(alarm, |pattern| pattern.write(&[], 0));
-                unknown.map(zeros).map_or(Answer::Nothing, Answer::Line)
+                Answer::of(unknown.map(zeros))
             }
         }
     }
@@ -174,6 +162,12 @@ enum Answer {
     Nothing,
     Line(String),
     Block(Vec<u8>),
+}
+
+impl Answer {
+    fn of(line: Option<String>) -> Self {
+        line.map_or(Self::Nothing, Self::Line)
+    }
 }
 
 /// Cuts bytes into lines at either line end.

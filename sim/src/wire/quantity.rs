@@ -127,3 +127,14 @@ named! {
         SupplyHeartbeat = "supply.heartbeat",
     }
 }
+
+impl Quantity {
+    /// Whether it is a counter or a clock, which runs round.
+    pub(super) const fn wraps(self) -> bool {
+        use Quantity::{DeviceReads, DeviceTime, DriveCount, DriveTime, ForceSample, ForceTime, Heartbeat};
+        matches!(
+            self,
+            ForceSample | ForceTime | DriveCount | DriveTime | DeviceTime | DeviceReads | Heartbeat
+        ) || matches!(self, Self::StageCount | Self::StageTime)
+    }
+}

@@ -116,16 +116,12 @@ impl RtuLine {
         if self.silent_turns > 20 {
             self.heard.clear();
         }
-        let own: Vec<u8> = self
-            .devices
-            .values()
-            .map(|device| &device.profile().description)
-            .flat_map(|d| {
-                let started = d.stream.as_ref().and_then(|stream| stream.start_function);
-                started.into_iter().chain(d.init.iter().filter_map(|init| init.function))
-            })
-            .map(|(function, _)| function)
-            .collect();
+        let functions = |device: &Device| {
+            let d = &device.profile().description;
+            let started = d.stream.as_ref().and_then(|stream| stream.start_function);
+            started.into_iter().chain(d.init.iter().filter_map(|init| init.function)).collect::<Vec<_>>()
+        };
+        let own: Vec<u8> = self.devices.values().flat_map(functions).map(|(function, _)| function).collect();
         loop {
             match rtu::hear(&self.heard, &own) {
                 Heard::Incomplete => return Vec::new(),
@@ -148,12 +144,8 @@ impl RtuLine {
         let key = device.profile().description.init.iter().find_map(|init| init.function);
         match operation {
             Operation::Read { function, address, count } => {
-                let table = match function {
-                    1 => Table::Coil,
-                    2 => Table::Discrete,
-                    3 => Table::Holding,
-                    _ => Table::Input,
-                };
+                let mut tables = [Table::Coil, Table::Discrete, Table::Holding].into_iter();
+                let table = tables.find(|table| table.read_function() == function).unwrap_or(Table::Input);
                 match device.read(table, address, count.min(125), &mut *plant, now) {
                     Ok(registers) => rtu::give(unit, function, &registers),
                     Err(refused) => rtu::refuse(unit, function, code(refused)),
@@ -219,7 +211,7 @@ pub(super) fn frames(
 ) -> (Vec<Vec<u8>>, Nanos) {
     let (mut plant, now) = plant.as_left();
     let Some(frame) = device.profile().frame("stream") else { return (Vec::new(), due) };
-    let end = device.profile().description.link.rx_terminator.clone().unwrap_or_else(|| "\n".into());
+    let end = device.profile().description.link.rx_end().to_owned();
     let period = Nanos::from_seconds(1.0 / stream.rate_hz).0.max(1);
     // A thread that was held up for long leaves samples out, as the instrument's own buffer would.
     let mut due = Nanos(due.0 + (now.since(due).0 / period).saturating_sub(FRAMES_A_TURN) * period);

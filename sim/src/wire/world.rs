@@ -6,7 +6,7 @@ use crate::room::Air;
 use crate::stage::StageInput;
 use crate::world::World;
 use models::quantity::PeakToPeak;
-use realtime::ports::Nanos;
+use realtime::ports::{Nanos, StageState};
 use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
 
 /// An operator's hands at the virtual rig: weights to hang on the force sensor, a vibrometer to look with.
@@ -144,7 +144,7 @@ impl Plant for WorldPlant {
         let stage = self.world.stage_status();
         let of_force = |f: fn(&crate::sensor::ForceSample) -> f64| force.as_ref().map_or(unknown, f);
         let of_drive = |f: fn(&crate::amplifier::AmplifierStatus) -> f64| drive.as_ref().map_or(unknown, f);
-        let of_stage = |f: fn(&crate::stage::StageStatus) -> f64| stage.as_ref().map_or(unknown, f);
+        let of_stage = |f: fn(&StageState) -> f64| stage.as_ref().map_or(unknown, f);
         match quantity {
             Quantity::LateralForce => of_force(|s| s.force_n[0]),
             Quantity::NormalForce => of_force(|s| s.force_n[1]),
@@ -171,15 +171,15 @@ impl Plant for WorldPlant {
             Quantity::StageCount => of_stage(|s| f64::from(s.sequence)),
             Quantity::StageTime => of_stage(|s| s.taken_at.seconds()),
             Quantity::SupplyClosed => truth(self.world.supply_closed()),
-            Quantity::EmergencyStop => truth(!self.world.operator().presses_emergency_stop),
-            Quantity::Interlock => truth(!self.world.operator().opens_guard),
+            Quantity::EmergencyStop => truth(!self.world.operator.presses_emergency_stop),
+            Quantity::Interlock => truth(!self.world.operator.opens_guard),
             Quantity::DeadMan => {
                 let now = self.world.now();
-                truth(self.world.operator().holds_dead_man_from.is_some_and(|from| now >= from))
+                truth(self.world.operator.holds_dead_man_from.is_some_and(|from| now >= from))
             }
-            Quantity::AmbientPressure => self.world.room().of(Air::Pressure),
-            Quantity::AirTemperature => self.world.room().of(Air::Temperature),
-            Quantity::RelativeHumidity => self.world.room().of(Air::Humidity),
+            Quantity::AmbientPressure => self.world.room.of(Air::Pressure),
+            Quantity::AirTemperature => self.world.room.of(Air::Temperature),
+            Quantity::RelativeHumidity => self.world.room.of(Air::Humidity),
             Quantity::DeviceTime => self.world.now().seconds(),
             // The emulator counts its own reads; the world knows nothing of them.
             Quantity::DeviceReads => 0.0,
@@ -202,15 +202,12 @@ impl Plant for WorldPlant {
                 Command::CloseSupply if value == 0.0 => self.world.cut_supply(),
                 Command::CloseSupply if self.supply_guard.lapsed => {}
                 Command::CloseSupply => self.world.close_supply(),
-                Command::AmbientPressure => self.world.room_mut().set(Air::Pressure, value),
-                Command::AirTemperature => self.world.room_mut().set(Air::Temperature, value),
-                Command::RelativeHumidity => self.world.room_mut().set(Air::Humidity, value),
+                Command::AmbientPressure => self.world.room.set(Air::Pressure, value),
+                Command::AirTemperature => self.world.room.set(Air::Temperature, value),
+                Command::RelativeHumidity => self.world.room.set(Air::Humidity, value),
             }
-            let of_drive = matches!(
-                command,
-                Command::Amplitude | Command::Frequency | Command::Enable | Command::DriveHeartbeat
-            );
-            drives |= of_drive;
+            drives |= matches!(command, Command::Amplitude | Command::Frequency);
+            drives |= matches!(command, Command::Enable | Command::DriveHeartbeat);
             moves |= matches!(command, Command::Velocity | Command::NormalForce | Command::StageHeartbeat);
         }
         if drives {

@@ -116,10 +116,9 @@ impl WorldConfig {
             ("stage.encoder_m", self.stage.encoder_m),
             ("stage.load_wander_s", self.stage.load_wander_s),
         ];
-        for (field, value) in positive {
-            if !(value.is_finite() && value > 0.0) {
-                return Err(ConfigError { field, value, needed: "a finite number above zero is needed" });
-            }
+        let refused = |field, value, needed| Err(ConfigError { field, value, needed });
+        if let Some((field, value)) = positive.into_iter().find(|(_, v)| !(v.is_finite() && *v > 0.0)) {
+            return refused(field, value, "a finite number above zero is needed");
         }
         let not_negative = [
             ("pass_relative_sd", self.pass_relative_sd),
@@ -134,18 +133,13 @@ impl WorldConfig {
             ("room.ambient_pressure_pa", self.room.ambient_pressure_pa),
             ("room.chamber.leak_per_s", self.room.chamber.leak_per_s),
         ];
-        for (field, value) in not_negative {
-            if !(value.is_finite() && value >= 0.0) {
-                return Err(ConfigError { field, value, needed: "a finite number, zero or more, is needed" });
-            }
+        if let Some((field, value)) = not_negative.into_iter().find(|(_, v)| !(v.is_finite() && *v >= 0.0)) {
+            return refused(field, value, "a finite number, zero or more, is needed");
         }
-        if self.finger.stiffness_relative_sd > 0.3 {
-            let (field, value) = ("finger.stiffness_relative_sd", self.finger.stiffness_relative_sd);
-            return Err(ConfigError {
-                field,
-                value,
-                needed: "at most 0.3, so that a stiffness stays positive",
-            });
+        let scatter = self.finger.stiffness_relative_sd;
+        if scatter > 0.3 {
+            let needed = "at most 0.3, so that a stiffness stays positive";
+            return refused("finger.stiffness_relative_sd", scatter, needed);
         }
         for (field, value) in [
             ("sensor.sample_period_s", self.sensor.sample_period_s),
@@ -154,20 +148,12 @@ impl WorldConfig {
         ] {
             let ticks = value / tick;
             if !(ticks >= 0.999 && (ticks - ticks.round()).abs() < 1e-6) {
-                return Err(ConfigError {
-                    field,
-                    value,
-                    needed: "a whole number of ticks (tick_ns) is needed",
-                });
+                return refused(field, value, "a whole number of ticks (tick_ns) is needed");
             }
         }
-        if self.stage.travel_m[1] <= self.stage.travel_m[0] {
-            let value = self.stage.travel_m[1];
-            return Err(ConfigError {
-                field: "stage.travel_m",
-                value,
-                needed: "the second end must lie above the first",
-            });
+        let [first, second] = self.stage.travel_m;
+        if second <= first {
+            return refused("stage.travel_m", second, "the second end must lie above the first");
         }
         Ok(())
     }

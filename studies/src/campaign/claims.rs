@@ -4,7 +4,7 @@
 //! rises), within the margin (it does not matter), or across it (undecided). A statement is supported or
 //! contradicted by that, never by a difference that is merely not significant.
 
-use super::measured::{Effect, Measured, contrast, ends, mean};
+use super::measured::{Driven, Effect, Measured, contrast, ends, mean};
 use models::covariate::{self, Covariate};
 use models::prediction::{EmpiricalPsi, FrictionModel, SpringSlider, Validity};
 use models::surrogate::Surrogate;
@@ -86,8 +86,12 @@ impl Claim {
         format!("{word}{more}")
     }
 
-    fn new(stated: &Stated, margin: f64, found: Result<(Effect, String), String>) -> Self {
-        let Stated { name, statement, source, expected } = *stated;
+    fn new(
+        [name, statement, source]: [&'static str; 3],
+        expected: Trend,
+        margin: f64,
+        found: Result<(Effect, String), String>,
+    ) -> Self {
         let (effect, of) = match found {
             Ok((effect, of)) => (Some(effect), of),
             Err(why) => (None, why),
@@ -102,75 +106,42 @@ impl Claim {
     }
 }
 
-struct Stated {
-    name: &'static str,
-    statement: &'static str,
-    source: &'static str,
-    expected: Trend,
-}
-
 const RESULT: &str = "part 1, section 6 (ii)";
 const FORCE: &str = "part 1, section 6 (iv)";
 const PART2: &str = "part 1, section 1, of part 2";
 
 /// Every statement with its answer, in the order of the page.
 pub fn claims(sessions: &[Measured], margin: f64) -> Vec<Claim> {
-    let state = |name, statement, source, expected| Stated { name, statement, source, expected };
-    let within = |factor: &'static Covariate, intermittent: bool| within(sessions, factor, intermittent);
+    use Trend::{Falls, Rises, Same};
+    let within = |factor: &Covariate, intermittent: bool| within(sessions, factor, intermittent);
+    let modulus = |s: &Measured| s.finger.young_modulus_pa;
     let ridge = Surrogate::shipped().ok();
-    let all = [
-        (
-            state("amplitude", "friction falls with amplitude", RESULT, Trend::Falls),
-            within(&covariate::AMPLITUDE, false),
-        ),
-        (
-            state("frequency", "friction falls with frequency", RESULT, Trend::Falls),
-            within(&covariate::FREQUENCY, false),
-        ),
-        (
-            state("speed", "friction rises with sliding speed", RESULT, Trend::Rises),
-            within(&covariate::SPEED, false),
-        ),
-        (
-            state("mu_0", "friction falls with the Coulomb friction coefficient", RESULT, Trend::Falls),
-            across(sessions, "mu_0", |s| s.mu0, |s| s.finger.young_modulus_pa),
-        ),
-        (
-            state(
-                "normal force",
-                "friction does not depend on the normal force once contact is intermittent",
-                FORCE,
-                Trend::Same,
-            ),
-            within(&covariate::NORMAL_FORCE, true),
-        ),
-        (
-            state("modulus", "friction does not depend on the tip's modulus", FORCE, Trend::Same),
-            across(sessions, "Young's modulus", |s| s.finger.young_modulus_pa, |s| s.mu0),
-        ),
-        (
-            state("ambient pressure", "friction does not depend on the ambient pressure", PART2, Trend::Same),
-            within(&covariate::AMBIENT_PRESSURE, false),
-        ),
-        (
-            state("spring-slider", "measurements are consistent with the spring-slider", PART2, Trend::Same),
-            beside(sessions, "the spring-slider", |s| SpringSlider::new(s.finger).ok()),
-        ),
-        (
-            state("ridge", "measurements are consistent with the finite element ridge", PART2, Trend::Same),
-            beside(sessions, "the ridge", |s| Some(ridge.clone()?.for_finger(&s.finger))),
-        ),
-        (
-            state(
-                "human and artificial",
-                "human and artificial tips follow the same law",
-                PART2,
-                Trend::Same,
-            ),
-            kinds(sessions),
-        ),
-    ];
-    all.into_iter().map(|(stated, found)| Claim::new(&stated, margin, found)).collect()
+    let ridge = |s: &Measured| Some(ridge.clone()?.for_finger(&s.finger));
+    let tip = "friction does not depend on the tip's modulus";
+    let air = "friction does not depend on the ambient pressure";
+    let coulomb = "friction falls with the Coulomb friction coefficient";
+    let intermittent = "friction does not depend on the normal force once contact is intermittent";
+    let one_law = "human and artificial tips follow the same law";
+    let near_slider = "measurements are consistent with the spring-slider";
+    let near_ridge = "measurements are consistent with the finite element ridge";
+    let slider = |s: &Measured| SpringSlider::new(s.finger).ok();
+    [
+        ("amplitude", "friction falls with amplitude", RESULT, Falls, within(&covariate::AMPLITUDE, false)),
+        ("frequency", "friction falls with frequency", RESULT, Falls, within(&covariate::FREQUENCY, false)),
+        ("speed", "friction rises with sliding speed", RESULT, Rises, within(&covariate::SPEED, false)),
+        ("mu_0", coulomb, RESULT, Falls, across(sessions, "mu_0", |s| s.mu0, modulus)),
+        ("normal force", intermittent, FORCE, Same, within(&covariate::NORMAL_FORCE, true)),
+        ("modulus", tip, FORCE, Same, across(sessions, "Young's modulus", modulus, |s| s.mu0)),
+        ("ambient pressure", air, PART2, Same, within(&covariate::AMBIENT_PRESSURE, false)),
+        ("spring-slider", near_slider, PART2, Same, beside(sessions, "the spring-slider", slider)),
+        ("ridge", near_ridge, PART2, Same, beside(sessions, "the ridge", ridge)),
+        ("human and artificial", one_law, PART2, Same, kinds(sessions)),
+    ]
+    .into_iter()
+    .map(|(name, statement, source, expected, found)| {
+        Claim::new([name, statement, source], expected, margin, found)
+    })
+    .collect()
 }
 
 /// The effect of a factor that is varied within sessions.
@@ -251,11 +222,8 @@ fn kinds(sessions: &[Measured]) -> Result<(Effect, String), String> {
             .filter(|s| s.kind != FingertipKind::Probe && (s.kind == FingertipKind::Human) == human);
         let departure = |s: &Measured| {
             let law = EmpiricalPsi::paper(s.finger).ok()?;
-            mean(
-                s.driven
-                    .iter()
-                    .filter_map(|d| Some(d.mu - law.relative_friction(&d.condition).ok()?.mu_relative)),
-            )
+            let beside = |d: &Driven| Some(d.mu - law.relative_friction(&d.condition).ok()?.mu_relative);
+            mean(s.driven.iter().filter_map(beside))
         };
         own.filter_map(departure).collect()
     };

@@ -82,6 +82,12 @@ pub fn mean(values: impl Iterator<Item = f64>) -> Option<f64> {
     (n > 0.0).then(|| sum / n)
 }
 
+/// Mean of some values, its variance, and their number; `None` of fewer than two.
+fn mean_and_variance(values: &[f64]) -> Option<(f64, f64, f64)> {
+    let (m, n) = (mean(values.iter().copied())?, values.len() as f64);
+    (n > 1.0).then(|| (m, values.iter().map(|v| (v - m).powi(2)).sum::<f64>() / (n - 1.0) / n, n))
+}
+
 /// A change of relative friction with its 95 % interval.
 #[derive(Clone, Copy, Debug, PartialEq, serde::Serialize)]
 pub struct Effect {
@@ -104,18 +110,13 @@ impl Effect {
 
     /// The mean of one value a session; `None` with fewer than two.
     pub fn mean_of(values: &[f64], shared: f64) -> Option<Self> {
-        let (m, n) = (mean(values.iter().copied())?, values.len() as f64);
-        let variance = values.iter().map(|v| (v - m).powi(2)).sum::<f64>() / (n - 1.0);
-        (n > 1.0).then(|| Effect::new(m, (variance / n).sqrt(), n - 1.0, shared, values.len())).flatten()
+        let (m, variance, n) = mean_and_variance(values)?;
+        Effect::new(m, variance.sqrt(), n - 1.0, shared, values.len())
     }
 
     /// Difference of the means of two groups, Welch's.
     pub fn between(a: &[f64], b: &[f64]) -> Option<Self> {
-        let of = |v: &[f64]| {
-            let (m, n) = (mean(v.iter().copied())?, v.len() as f64);
-            (n > 1.0).then(|| (m, v.iter().map(|x| (x - m).powi(2)).sum::<f64>() / (n - 1.0) / n, n))
-        };
-        let ((ma, va, na), (mb, vb, nb)) = (of(a)?, of(b)?);
+        let ((ma, va, na), (mb, vb, nb)) = (mean_and_variance(a)?, mean_and_variance(b)?);
         let freedom =
             (va + vb).powi(2) / (va * va / (na - 1.0) + vb * vb / (nb - 1.0)).max(f64::MIN_POSITIVE);
         Effect::new(ma - mb, (va + vb).sqrt(), freedom.clamp(1.0, 1e6), 0.0, a.len() + b.len())

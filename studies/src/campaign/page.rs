@@ -128,7 +128,7 @@ fn answers(claims: &[Claim]) -> String {
     };
     let rows: String = claims.iter().map(row).collect();
     let head = "<th>statement</th><th>expected</th><th>measured over</th><th>change of \u{3bc}'</th><th>answer</th><th>decided beyond</th>";
-    table("Statements of the paper with their answers", head, &rows)
+    table("Statements of the paper with their answers", head, [rows])
 }
 
 fn of_cell(made: &[Measured], cell: usize) -> impl Iterator<Item = &Measured> {
@@ -253,5 +253,5 @@ fn session_table(file: &CampaignFile, made: &[Measured]) -> String {
     let rows: String = sessions(file).into_iter().map(row).collect();
     let head = "<th>session</th><th>block</th><th>cell</th><th>condition</th><th>folder</th><th>state</th>\
                 <th>\u{3bc}<sub>0</sub></th><th>passes with vibration</th>";
-    table("Sessions in the order of measurement", head, &rows)
+    table("Sessions in the order of measurement", head, [rows])
 }

@@ -6,7 +6,7 @@
 
 use models::sparse::basis;
 use serde::{Deserialize, Serialize};
-use std::collections::HashMap;
+use std::collections::HashSet;
 
 /// Place of a node along one axis: `index / 2^level`, the index odd.
 type Step = (u8, u32);
@@ -23,13 +23,6 @@ pub struct Node {
     pub surplus: f64,
     /// Whether its children are there.
     pub refined: bool,
-}
-
-impl Node {
-    /// Its place, each axis 0 to 1.
-    pub fn place(&self) -> Vec<f64> {
-        self.steps.iter().map(|(level, index)| f64::from(*index) / f64::from(1_u32 << level)).collect()
-    }
 }
 
 /// The grid.
@@ -69,7 +62,7 @@ impl SparseGrid {
     /// The nodes to add next: the children of the nodes with the largest surplus, `about` so many with the ancestors that they need;
     /// at first the middle and the first two levels about it. Empty where no node can be refined.
     pub fn next(&mut self, about: usize) -> Vec<Vec<Step>> {
-        let mut there: HashMap<Vec<Step>, ()> = self.nodes.iter().map(|n| (n.steps.clone(), ())).collect();
+        let mut there: HashSet<Vec<Step>> = self.nodes.iter().map(|n| n.steps.clone()).collect();
         let mut new = Vec::new();
         if self.nodes.is_empty() {
             let middle = vec![(1, 1); self.dimensions];
@@ -110,18 +103,15 @@ impl SparseGrid {
     /// Adds nodes of [`SparseGrid::next`] with the values found there, none where a case has no result.
     pub fn take(&mut self, new: Vec<Vec<Step>>, values: &[Option<f64>]) {
         for (steps, value) in new.into_iter().zip(values) {
-            let mut node = Node { steps, surplus: 0.0, refined: value.is_none() };
-            if let Some(value) = value {
-                node.surplus = value - self.at(&node.place());
-            }
-            self.nodes.push(node);
+            let surplus = value.map_or(0.0, |value| value - self.at(&place_of(&steps)));
+            self.nodes.push(Node { steps, surplus, refined: value.is_none() });
         }
     }
 }
 
 /// A node and the ancestors that are missing.
-fn add(steps: &[Step], there: &mut HashMap<Vec<Step>, ()>, new: &mut Vec<Vec<Step>>) {
-    if there.insert(steps.to_vec(), ()).is_some() {
+fn add(steps: &[Step], there: &mut HashSet<Vec<Step>>, new: &mut Vec<Vec<Step>>) {
+    if !there.insert(steps.to_vec()) {
         return;
     }
     for axis in 0..steps.len() {
@@ -140,9 +130,9 @@ fn sorted(mut new: Vec<Vec<Step>>) -> Vec<Vec<Step>> {
     new
 }
 
-/// The place of steps that are no node yet.
+/// The place of a node, each axis 0 to 1.
 pub fn place_of(steps: &[Step]) -> Vec<f64> {
-    Node { steps: steps.to_vec(), surplus: 0.0, refined: false }.place()
+    steps.iter().map(|(level, index)| f64::from(*index) / f64::from(1_u32 << level)).collect()
 }
 
 #[cfg(test)]
@@ -172,8 +162,8 @@ mod tests {
         assert!(rms(&grid, 3, &f) < 1e-12);
         let bent = |p: &[f64]| (3.0 * p[0] * p[1]).sin() + (p[2] - 0.3).abs();
         let grid = grown(3, 300, 40, &bent);
-        let worst =
-            grid.nodes.iter().map(|n| (grid.at(&n.place()) - bent(&n.place())).abs()).fold(0.0, f64::max);
+        let off = |n: &Node| (grid.at(&place_of(&n.steps)) - bent(&place_of(&n.steps))).abs();
+        let worst = grid.nodes.iter().map(off).fold(0.0, f64::max);
         assert!(worst < 1e-12, "{worst}");
     }
 

@@ -2,6 +2,7 @@
 //! order, the ranges, the machine or the number of threads. It is streamed: what is in memory does not grow with the number of cases.
 
 use super::file::hex;
+use super::plan::length;
 use super::run::Entry;
 use super::shard::{Facts, Reader, Writer};
 use super::study::Study;
@@ -79,7 +80,7 @@ pub fn gather(study: &Study, to: &Path, any_build: bool) -> miette::Result<Gathe
     let cases = study.file.header.cases;
     let holes = holes(&there, cases);
     if !holes.is_empty() {
-        let missing: u64 = holes.iter().map(|h| h.end - h.start).sum();
+        let missing = length(&holes);
         let mut named: Vec<String> =
             holes.iter().take(NAMED).map(|h| format!("{}..{}", h.start, h.end)).collect();
         named.extend((holes.len() > NAMED).then(|| format!("and {} more", holes.len() - NAMED)));

@@ -179,9 +179,10 @@ fn no_lines(header: &Header) -> miette::Result<()> {
     Ok(())
 }
 
-/// What the names of a list come to in one cell.
-fn joined(names: &[String]) -> String {
-    names.join("+")
+/// A unit variant as its JSON has it.
+fn word(of: impl serde::Serialize) -> Result<String, String> {
+    let value = serde_json::to_value(of).map_err(|e| e.to_string())?;
+    Ok(value.as_str().map_or_else(|| value.to_string(), str::to_string))
 }
 
 /// What the last cell of a kind with a column `document` holds.

@@ -60,12 +60,23 @@ pub struct Plan {
     pub limit_s: f64,
 }
 
+/// Cases of some ranges.
+pub(super) fn length(ranges: &[Range<u64>]) -> u64 {
+    ranges.iter().map(|r| r.end - r.start).sum()
+}
+
+/// A range in ranges of `most` cases.
+pub(super) fn pieces(range: &Range<u64>, most: u64) -> impl Iterator<Item = Range<u64>> + use<> {
+    let end = range.end;
+    (range.start..end).step_by(most as usize).map(move |start| start..(start + most).min(end))
+}
+
 /// Runs cases spread over what is missing, one at a time, for `budget` at most; their results are dropped.
 ///
 /// # Errors
 /// A case that cannot be made.
 pub fn measure(study: &Study, holes: &[Range<u64>], cases: usize, budget: Duration) -> miette::Result<Pilot> {
-    let missing: u64 = holes.iter().map(|h| h.end - h.start).sum();
+    let missing = length(holes);
     let count = (cases.max(1) as u64).min(missing);
     let (begun, mut times) = (Instant::now(), Vec::new());
     for i in 0..count {
@@ -102,20 +113,12 @@ fn nth(holes: &[Range<u64>], mut n: u64) -> u64 {
 
 /// Cuts what is missing into tasks of about `task_s` seconds; none is over a third of `limit_s` where that is given.
 pub fn cut(holes: &[Range<u64>], pilot: &Pilot, workers: u64, task_s: f64, limit_s: Option<f64>) -> Plan {
-    let missing: u64 = holes.iter().map(|h| h.end - h.start).sum();
+    let missing = length(holes);
     let wanted = limit_s.map_or(task_s, |limit| task_s.min(limit / 3.0));
     let by_time = (wanted / pilot.mean_s.max(1e-6)) as u64;
     let by_share = missing.div_ceil(TASKS_A_WORKER * workers.max(1));
     let cases_a_task = by_time.min(by_share).min(MOST).max(missing.div_ceil(TASKS)).max(1);
-    let mut ranges = Vec::new();
-    for hole in holes {
-        let mut start = hole.start;
-        while start < hole.end {
-            let end = (start + cases_a_task).min(hole.end);
-            ranges.push(start..end);
-            start = end;
-        }
-    }
+    let ranges = holes.iter().flat_map(|hole| pieces(hole, cases_a_task)).collect();
     let expected = cases_a_task as f64 * pilot.mean_s;
     Plan {
         ranges,

@@ -154,9 +154,6 @@ impl<W: Write + Send> Writer<W> {
     }
 
     /// Writes what is held as a row group.
-    ///
-    /// # Errors
-    /// As the file system.
     fn flush(&mut self) -> miette::Result<()> {
         if self.held.is_empty() {
             return Ok(());

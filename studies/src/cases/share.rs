@@ -3,7 +3,7 @@
 //! tasks alone. So a task that an engine starts again, on whatever machine, has the same cases.
 
 use super::gather::holes;
-use super::plan::MOST;
+use super::plan::{MOST, pieces};
 use super::study::Study;
 use miette::{bail, miette};
 use std::ops::Range;
@@ -103,10 +103,6 @@ impl Share {
         let part = self.part(study.file.header.cases);
         let within = |hole: Range<u64>| hole.start.max(part.start)..hole.end.min(part.end);
         let holes = holes(&study.ranges_there()?, study.file.header.cases).into_iter().map(within);
-        let pieces = |hole: Range<u64>| {
-            let end = hole.end;
-            hole.step_by(MOST as usize).map(move |start| start..(start + MOST).min(end))
-        };
-        Ok(holes.filter(|hole| !hole.is_empty()).flat_map(pieces).collect())
+        Ok(holes.filter(|hole| !hole.is_empty()).flat_map(|hole| pieces(&hole, MOST)).collect())
     }
 }

@@ -32,6 +32,12 @@ pub struct Manifest {
     version: String,
 }
 
+impl Manifest {
+    fn of(bytes: &[u8], place: &Path) -> miette::Result<Manifest> {
+        serde_json::from_slice(bytes).into_diagnostic().wrap_err_with(|| place.display().to_string())
+    }
+}
+
 /// An open study.
 pub struct Study {
     /// The cases.
@@ -44,10 +50,7 @@ pub struct Study {
 }
 
 impl Study {
-    /// Opens a file of cases alone.
-    ///
-    /// # Errors
-    /// A file that this program does not take, or that another version wrote.
+    /// Opens a file of cases alone; refuses one that this program does not take, or that another version wrote.
     fn of(cases: &Path, out: PathBuf) -> miette::Result<Study> {
         let file = CaseFile::open(cases)?;
         let kind = kinds::by_name(&file.header.kind)?;
@@ -83,7 +86,7 @@ impl Study {
         };
         let place = study.out.join("study.json");
         match fs::read(&place) {
-            Ok(bytes) => study.same(&bytes)?,
+            Ok(bytes) => study.same(&Manifest::of(&bytes, &place)?)?,
             Err(why) if why.kind() == ErrorKind::NotFound => {
                 let (part, mut file) = study.part("study.json")?;
                 let text = serde_json::to_vec(&manifest).into_diagnostic()?;
@@ -112,18 +115,14 @@ impl Study {
         let bytes = fs::read(&place)
             .into_diagnostic()
             .wrap_err_with(|| format!("{}: no study: {} cannot be read", out.display(), place.display()))?;
-        let manifest: Manifest =
-            serde_json::from_slice(&bytes).into_diagnostic().wrap_err_with(|| place.display().to_string())?;
+        let manifest = Manifest::of(&bytes, &place)?;
         let study = Study::of(cases.unwrap_or(&manifest.cases), out.canonicalize().into_diagnostic()?)?;
-        study.same(&bytes)?;
+        study.same(&manifest)?;
         Ok(study)
     }
 
     /// Refuses a folder whose `study.json` is of other cases.
-    fn same(&self, manifest: &[u8]) -> miette::Result<()> {
-        let there: Manifest = serde_json::from_slice(manifest)
-            .into_diagnostic()
-            .wrap_err_with(|| self.out.join("study.json").display().to_string())?;
+    fn same(&self, there: &Manifest) -> miette::Result<()> {
         if (there.schema.as_str(), &there.header) == (SCHEMA, &self.file.digest) {
             return Ok(());
         }

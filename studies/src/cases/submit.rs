@@ -5,7 +5,7 @@
 use super::engines::{self, Engine, Handed, Job};
 use super::file::{self, Header};
 use super::gather::{gather, holes};
-use super::plan::{self, Pilot, Plan};
+use super::plan::{self, Pilot, Plan, length};
 use super::run::Entry;
 use super::shard::Reader;
 use super::study::Study;
@@ -31,7 +31,7 @@ const ASK: Duration = Duration::from_secs(5);
 const ROUNDS: u32 = 4;
 
 /// How to submit: the options of `muprime submit`.
-#[derive(Clone, Debug, clap::Args)]
+#[derive(Clone, Debug, Default, clap::Args)]
 pub struct Options {
     /// local, slurm, hq or dask
     #[arg(long, default_value = "local")]
@@ -77,16 +77,11 @@ impl Options {
         Options {
             engine: "local".into(),
             workers: Some(workers as u64),
-            limit_s: None,
             task_s: 4.0,
-            pilot: 0,
             case_s: Some(0.5),
-            detach: false,
-            server: None,
-            python: String::new(),
             cores_a_task: 1,
             window: 1,
-            options: Vec::new(),
+            ..Options::default()
         }
     }
 }
@@ -106,7 +101,7 @@ fn seconds_of(text: &str) -> Result<f64, String> {
 }
 
 /// What a submission came to.
-#[derive(Clone, Debug, Serialize)]
+#[derive(Clone, Debug, Default, Serialize)]
 pub struct Submitted {
     /// Folder of the study.
     pub out: PathBuf,
@@ -130,10 +125,6 @@ pub struct Submitted {
     pub ids: Vec<String>,
     /// Time from beginning to end, s.
     pub wall_seconds: f64,
-}
-
-fn length(ranges: &[Range<u64>]) -> u64 {
-    ranges.iter().map(|r| r.end - r.start).sum()
 }
 
 /// Submits what is missing of a study.
@@ -169,12 +160,7 @@ pub fn submit(study: &Study, options: &Options) -> miette::Result<Submitted> {
         cases,
         there: cases - first,
         missing: first,
-        pilot: None,
-        tasks: 0,
-        cases_a_task: 0,
-        limit_s: 0.0,
-        ids: Vec::new(),
-        wall_seconds: 0.0,
+        ..Submitted::default()
     };
     for (folder, job) in at_work(&study.out)? {
         match engine.filter(|engine| engine.name == job.engine) {

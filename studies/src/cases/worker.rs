@@ -51,30 +51,20 @@ pub fn work(study: &Study, range: Range<u64>, program: &str, job: Option<&Path>)
     let (part, file) = study.part(&name)?;
     crash_points::here("part-made");
     let written = write(study, &range, program, BufWriter::new(file), &cancelled);
-    let moved = written.and_then(|failed| match failed {
-        None => Ok(None),
-        Some(failed) => {
-            runs::files::make_folder(place.parent().unwrap_or(&study.out)).wrap_err(Unfinished::NotKept)?;
-            fs::rename(&part, &place).into_diagnostic().wrap_err_with(|| place.display().to_string())?;
-            Ok(Some(failed))
-        }
+    let moved = written.and_then(|failed| {
+        let Some(failed) = failed else { return Ok(None) };
+        runs::files::make_folder(place.parent().unwrap_or(&study.out)).wrap_err(Unfinished::NotKept)?;
+        fs::rename(&part, &place).into_diagnostic().wrap_err_with(|| place.display().to_string())?;
+        Ok(Some(failed))
     });
-    match moved {
-        Ok(Some(failed)) => {
-            crash_points::here("moved");
-            runs::files::sync_folder_of(&place).into_diagnostic().wrap_err(Unfinished::NotKept)?;
-            crash_points::here("folder-synced");
-            Ok(Done::Made { failed })
-        }
-        Ok(None) => {
-            let _ = fs::remove_file(&part);
-            Ok(Done::Cancelled)
-        }
-        Err(why) => {
-            let _ = fs::remove_file(&part);
-            Err(why)
-        }
+    if !matches!(moved, Ok(Some(_))) {
+        let _ = fs::remove_file(&part);
     }
+    let Some(failed) = moved? else { return Ok(Done::Cancelled) };
+    crash_points::here("moved");
+    runs::files::sync_folder_of(&place).into_diagnostic().wrap_err(Unfinished::NotKept)?;
+    crash_points::here("folder-synced");
+    Ok(Done::Made { failed })
 }
 
 /// Whether the shard at a range's place is that of its cases. One that cannot be read is set aside, with a word.

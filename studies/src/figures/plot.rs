@@ -21,29 +21,10 @@ pub struct Series {
 
 /// What the paper states of a figure without a curve for it.
 pub enum Stated {
-    /// Something happens between two values of x.
-    Span {
-        /// From where to where.
-        range: [f64; 2],
-        /// What the paper says.
-        words: String,
-    },
-    /// A value of y.
-    Level {
-        /// The value.
-        value: f64,
-        /// What the paper says.
-        words: String,
-    },
-}
-
-impl Stated {
-    /// What the paper says.
-    pub fn words(&self) -> &str {
-        match self {
-            Stated::Span { words, .. } | Stated::Level { words, .. } => words,
-        }
-    }
+    /// Something happens between two values of x: which, and what the paper says.
+    Span([f64; 2], &'static str),
+    /// A value of y, and what the paper says.
+    Level(f64, &'static str),
 }
 
 impl Series {

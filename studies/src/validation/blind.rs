@@ -186,23 +186,19 @@ pub fn score(set: &Set, options: &Options) -> miette::Result<Scored> {
         .passes
         .iter()
         .map(|p| {
-            report.location.regions.iter().any(|r| {
-                r.bounds.iter().all(|(name, b)| {
-                    let v = covariate::by_name(name).and_then(|c| c.of(p)).unwrap_or(f64::NAN);
-                    v >= b[0] && v <= b[1]
-                })
-            })
+            let value = |name: &str| covariate::by_name(name).and_then(|c| c.of(p)).unwrap_or(f64::NAN);
+            let holds = |(name, [low, high]): (&&str, &[f64; 2])| (*low..=*high).contains(&value(name));
+            report.location.regions.iter().any(|r| r.bounds.iter().all(holds))
         })
         .collect();
     let both = named.iter().zip(&wanted).filter(|(a, b)| **a && **b).count() as f64;
     let sizes = (named.iter().filter(|x| **x).count() + wanted.iter().filter(|x| **x).count()) as f64;
     let region_f1 = wanted.iter().any(|x| *x).then(|| 2.0 * both / sizes.max(1.0));
 
-    let gain = label.chi2_gain;
     Ok(Scored {
         seed: label.seed,
         stratum: label.stratum,
-        chi2_gain: gain,
+        chi2_gain: label.chi2_gain,
         gap_over_floor: label.hidden_recalibrated_rmse / label.hidden_floor_rmse.max(1e-12),
         decidable: label.decidable(),
         best_single_leaves: label.best_single_leaves,

@@ -1,6 +1,7 @@
 //! The cells of a point table: all that is wrong with them, each at its cell.
 
 use super::place::remedy;
+use crate::import::apart;
 use diagnosis::data::DataError;
 use models::pass::{FAULTS, Pass, TableError, read_readable};
 use runs::input::Problems;
@@ -31,8 +32,7 @@ pub(super) fn passes(name: &str, bytes: &[u8]) -> miette::Result<Vec<Pass>> {
     let text = String::from_utf8_lossy(bytes);
     let mut wrong = Problems::of(name, &text);
     for (line, column, problem) in faults.into_iter().take(FAULTS) {
-        let turned = problem.contains("normal_force_n = -");
-        let help = match turned {
+        let help = match problem.contains("normal_force_n = -") {
             true => "the normal force is positive in compression: turn the sign of the column".into(),
             false => remedy(Some("table")),
         };
@@ -59,20 +59,14 @@ fn cell(text: &str, line: u64, column: Option<&str>) -> Range<usize> {
 
 /// The cells of one line without blanks around them: a comma in quotation marks parts none.
 fn cells(line: &str) -> Vec<Range<usize>> {
-    let (mut all, mut from, mut quoted) = (Vec::new(), 0, false);
-    for (at, c) in line.char_indices().chain([(line.len(), ',')]) {
-        match c {
-            '"' => quoted = !quoted,
-            ',' if !quoted || at == line.len() => {
-                let cell = &line[from..at];
-                let start = from + cell.len() - cell.trim_start().len();
-                all.push(start..start.max(from + cell.trim_end().len()));
-                from = at + 1;
-            }
-            _ => {}
-        }
-    }
-    all
+    let mut from = 0;
+    let range = |cell: &str| {
+        let start = from + cell.len() - cell.trim_start().len();
+        let range = start..start.max(from + cell.trim_end().len());
+        from += cell.len() + 1;
+        range
+    };
+    apart(line, |c| c == ',').map(range).collect()
 }
 
 #[cfg(test)]

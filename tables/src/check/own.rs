@@ -1,6 +1,6 @@
 //! What the program writes beside a run's own files: exports, documents of campaigns and studies, tags.
 
-use super::read_json;
+use super::holds;
 use miette::{IntoDiagnostic, WrapErr};
 use runs::input::{MAX_TABLE_BYTES, bytes_of, parse_toml, text_of};
 use std::fs::File;
@@ -61,14 +61,8 @@ pub(super) fn judge(kind: &str, path: &Path) -> Option<miette::Result<Option<usi
         "annotations" => text_of(path)
             .and_then(|text| Ok(parse_toml::<runs::catalogue::Annotations>(&name, &text)?))
             .and_then(|annotations| annotations.checked().map(drop)),
-        "fidelity" => read_json(&name)
-            .and_then(|found| serde_json::from_value::<runs::fidelity::Fidelity>(found).into_diagnostic())
-            .map(drop),
-        "tips of a campaign" => read_json(&name)
-            .and_then(|found| {
-                serde_json::from_value::<Vec<runs::fingertip::FingertipKind>>(found).into_diagnostic()
-            })
-            .map(drop),
+        "fidelity" => holds::<runs::fidelity::Fidelity>(&name),
+        "tips of a campaign" => holds::<Vec<runs::fingertip::FingertipKind>>(&name),
         "campaign folder" => return Some(campaign(path).map(Some)),
         "claims of a campaign" | "study" | "RO-Crate" | "HDF5 export" => Ok(()),
         _ => return None,

@@ -2,7 +2,7 @@
 
 use super::place::{problems_of, remedy};
 use super::{Good, On, judge, kind_of, read_json, shape};
-use crate::import::remarks;
+use crate::import::{as_csv, remarks};
 use crate::schemas::schema::Kind;
 use miette::{IntoDiagnostic, WrapErr};
 use runs::input::{MAX_TABLE_BYTES, Problems, bytes_of};
@@ -11,34 +11,27 @@ use std::path::Path;
 /// A point table, as a diagnosis would take it; one of conditions has no lateral force.
 pub(super) fn table(path: &Path) -> miette::Result<Good> {
     let bytes = bytes_of(path, MAX_TABLE_BYTES)?;
-    let bytes =
-        if bytes.starts_with(b"PAR1") { crate::import::parquet_as_csv(path)?.into_bytes() } else { bytes };
-    let law = |text: &&str| {
-        let rows = runs::model_file::hashed(text);
-        let head = rows.lines().next().unwrap_or_default().split(',').map(str::trim);
-        head.clone().any(|h| h == models::law_table::ANSWERS[0].0) && !head.clone().any(|h| h == "point")
-    };
-    if let Some(text) = std::str::from_utf8(&bytes).ok().filter(law) {
-        runs::model_file::load(&path.display().to_string(), text)?;
-        return Ok(Good { kind: "law table", passes: None, remarks: Vec::new() });
+    let bytes = as_csv(path, &bytes)?;
+    let name = path.display().to_string();
+    let text = std::str::from_utf8(&bytes).ok();
+    let rows = text.map(runs::model_file::hashed).unwrap_or_default();
+    let has =
+        |column: &str| rows.lines().next().is_some_and(|head| head.split(',').any(|h| h.trim() == column));
+    let good = |kind, passes| Good { kind, passes, remarks: Vec::new() };
+    if let Some(text) = text.filter(|_| has(models::law_table::ANSWERS[0].0) && !has("point")) {
+        runs::model_file::load(&name, text)?;
+        return Ok(good("law table", None));
     }
-    let effect = |text: &&str| {
-        let rows = runs::model_file::hashed(text);
-        rows.lines().next().unwrap_or_default().split(',').any(|h| h.trim() == effects::own::COLUMN)
-    };
-    if std::str::from_utf8(&bytes).ok().filter(effect).is_some() {
+    if has(effects::own::COLUMN) {
         crate::law::own_effects(&[path.to_path_buf()])?;
-        return Ok(Good { kind: "effect table", passes: None, remarks: Vec::new() });
+        return Ok(good("effect table", None));
     }
-    let passes = super::cells::passes(&path.display().to_string(), &bytes)?;
-    let mut good = Good { kind: "table", passes: Some(passes.len()), remarks: Vec::new() };
+    let passes = super::cells::passes(&name, &bytes)?;
     if passes.iter().all(|p| p.lateral_force_n.is_none()) {
-        good.kind = "table of conditions";
-    } else {
-        diagnosis::data::Table::measured(&passes).into_diagnostic()?;
-        good.remarks = remarks::of_table(&passes);
+        return Ok(good("table of conditions", Some(passes.len())));
     }
-    Ok(good)
+    diagnosis::data::Table::measured(&passes).into_diagnostic()?;
+    Ok(Good { remarks: remarks::of_table(&passes), ..good("table", Some(passes.len())) })
 }
 
 /// A record, from its first byte to its last.

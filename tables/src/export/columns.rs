@@ -29,6 +29,24 @@ impl Column {
     pub fn unit(&self) -> Option<&'static str> {
         (!matches!(self.cells, Cells::Texts(_))).then(|| unit::of(self.name))
     }
+
+    /// How many cells it has.
+    pub fn rows(&self) -> usize {
+        match &self.cells {
+            Cells::Numbers(v) => v.len(),
+            Cells::Counts(v) => v.len(),
+            Cells::Texts(v) => v.len(),
+        }
+    }
+
+    /// A cell as text, a number with as many digits as it takes to read it back unchanged.
+    pub fn shown(&self, row: usize) -> Option<String> {
+        match &self.cells {
+            Cells::Numbers(v) => v[row].map(|v| v.to_string()),
+            Cells::Counts(v) => v[row].map(|v| v.to_string()),
+            Cells::Texts(v) => v[row].clone(),
+        }
+    }
 }
 
 /// Columns of one length.
@@ -90,13 +108,4 @@ pub fn of(passes: &[MeasuredPass]) -> Table {
         numbers("psi_eq17", "Psi of Eq. 17 at the measured condition", &|p| p.psi_eq17),
     ]);
     table
-}
-
-/// Rows of a table.
-pub fn rows(table: &Table) -> usize {
-    table.first().map_or(0, |column| match &column.cells {
-        Cells::Numbers(v) => v.len(),
-        Cells::Counts(v) => v.len(),
-        Cells::Texts(v) => v.len(),
-    })
 }

@@ -57,23 +57,19 @@ fn put_fact(group: &mut GroupBuilder, name: &str, fact: Option<&String>) {
 
 fn put(group: &mut GroupBuilder, column: &Column) {
     let dataset = group.create_dataset(column.name);
-    let missing = match &column.cells {
+    match &column.cells {
         Cells::Numbers(v) => {
-            let values: Vec<f64> = v.iter().map(|v| v.unwrap_or(f64::NAN)).collect();
-            dataset.with_f64_data(&values);
-            v.iter().filter(|v| v.is_none()).count()
+            dataset.with_f64_data(&v.iter().map(|v| v.unwrap_or(f64::NAN)).collect::<Vec<_>>());
         }
         Cells::Counts(v) => {
-            let values: Vec<u64> = v.iter().map(|v| v.unwrap_or(u64::MAX)).collect();
-            dataset.with_u64_data(&values);
-            v.iter().filter(|v| v.is_none()).count()
+            dataset.with_u64_data(&v.iter().map(|v| v.unwrap_or(u64::MAX)).collect::<Vec<_>>());
         }
         Cells::Texts(v) => {
             let values: Vec<&str> = v.iter().map(|v| v.as_deref().unwrap_or_default()).collect();
             dataset.with_vlen_strings(&values);
-            v.iter().filter(|v| v.is_none()).count()
         }
-    };
+    }
+    let missing = (0..column.rows()).filter(|row| column.shown(*row).is_none()).count();
     dataset.set_attr("long_name", text(column.words));
     if let Some(unit) = column.unit() {
         // The empty unit is NeXus's word for a number without one.

@@ -20,16 +20,6 @@ pub struct Array {
     pub units: Vec<String>,
 }
 
-/// A number as a cell; what is none is empty.
-pub fn number(value: f64) -> Cell {
-    if value.is_nan() { Cell::Empty } else { Cell::Number(value) }
-}
-
-/// A single as a cell: the fewest digits stand for what was meant.
-pub fn single(value: f32) -> Cell {
-    Cell::of(&format!("{value:e}"))
-}
-
 /// What is in a file besides: what could not be read, by its kind, and short texts by name.
 #[derive(Clone, Debug, Default)]
 pub struct Beside {

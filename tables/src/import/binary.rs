@@ -33,19 +33,17 @@ pub fn parquet(path: &std::path::Path) -> miette::Result<Grid> {
         .map(|(f, ticks)| if matches!(ticks, Some(Ticks::Span(_))) { "s".into() } else { unit(f.metadata()) })
         .collect();
     let cell = |k: usize, field: &Field| match field {
-        Field::Long(v) if ticks.get(k).is_some_and(Option::is_some) => {
-            ticks[k].as_ref().map_or(Cell::Empty, |ticks| ticks.cell(*v))
-        }
         Field::Null => Cell::Empty,
-        Field::Double(v) if v.is_nan() => Cell::Empty,
-        Field::Float(v) if v.is_nan() => Cell::Empty,
-        Field::Double(v) => Cell::Number(*v),
-        // The fewest digits of a single stand for what was meant.
-        Field::Float(v) => Cell::of(&format!("{v:e}")),
+        Field::Double(v) => Cell::number(*v),
+        Field::Float(v) => Cell::single(*v),
         Field::TimestampMillis(v) => Cell::Clock(*v as f64 * 1e-3),
         Field::TimestampMicros(v) => Cell::Clock(*v as f64 * 1e-6),
         Field::Str(text) => Cell::of(text),
         Field::Group(_) | Field::ListInternal(_) | Field::MapInternal(_) => Cell::Text("(nested)".into()),
+        Field::Long(v) => {
+            let clock = ticks.get(k).copied().flatten();
+            clock.map_or_else(|| Cell::of(&v.to_string()), |ticks| ticks.cell(*v))
+        }
         other => Cell::of(&other.to_string()),
     };
     let mut rows = Vec::new();
@@ -58,6 +56,7 @@ pub fn parquet(path: &std::path::Path) -> miette::Result<Grid> {
 
 /// Whole numbers of a clock, with the power of ten of their unit in s.
 #[cfg(feature = "parquet")]
+#[derive(Clone, Copy)]
 enum Ticks {
     /// A time since some day.
     Clock(i32),
@@ -105,10 +104,7 @@ fn unit(about: &arrow_schema::Metadata) -> String {
 #[cfg(feature = "arrow")]
 pub fn arrow(bytes: &[u8]) -> miette::Result<Grid> {
     use arrow_array::cast::AsArray;
-    use arrow_array::types::{
-        Float32Type, Float64Type, Int8Type, Int16Type, Int32Type, Int64Type, UInt8Type, UInt16Type,
-        UInt32Type, UInt64Type,
-    };
+    use arrow_array::types::{Float32Type, Float64Type};
     use arrow_array::{Array, ArrayRef};
     use arrow_schema::DataType;
     let wrong = |e: arrow_schema::ArrowError| {
@@ -119,32 +115,17 @@ pub fn arrow(bytes: &[u8]) -> miette::Result<Grid> {
     let names = schema.fields().iter().map(|f| f.name().clone()).collect();
     let units = schema.fields().iter().map(|f| unit(f.metadata())).collect();
     let cell = |column: &ArrayRef, k: usize| {
-        macro_rules! number {
-            ($type:ty) => {
-                match column.as_primitive::<$type>().value(k) as f64 {
-                    v if v.is_nan() => Cell::Empty,
-                    v => Cell::Number(v),
-                }
-            };
-        }
         if column.is_null(k) {
             return Cell::Empty;
         }
-        match column.data_type() {
-            DataType::Float64 => number!(Float64Type),
-            DataType::Float32 => Cell::of(&format!("{:e}", column.as_primitive::<Float32Type>().value(k))),
-            DataType::Int8 => number!(Int8Type),
-            DataType::Int16 => number!(Int16Type),
-            DataType::Int32 => number!(Int32Type),
-            DataType::Int64 => number!(Int64Type),
-            DataType::UInt8 => number!(UInt8Type),
-            DataType::UInt16 => number!(UInt16Type),
-            DataType::UInt32 => number!(UInt32Type),
-            DataType::UInt64 => number!(UInt64Type),
+        arrow_array::downcast_integer_array!(
+            column => Cell::Number(column.value(k) as f64),
+            DataType::Float64 => Cell::number(column.as_primitive::<Float64Type>().value(k)),
+            DataType::Float32 => Cell::single(column.as_primitive::<Float32Type>().value(k)),
             DataType::Utf8 => Cell::of(column.as_string::<i32>().value(k)),
             DataType::LargeUtf8 => Cell::of(column.as_string::<i64>().value(k)),
             other => Cell::Text(format!("({other})")),
-        }
+        )
     };
     let mut rows = Vec::new();
     for batch in reader {
@@ -185,74 +166,61 @@ pub fn npy(bytes: &[u8]) -> miette::Result<Grid> {
         )
     };
     let short = || refuse("it is cut short");
-    let version = *bytes.get(6).ok_or_else(short)?;
-    let (length, start): (_, usize) = match version {
-        1 => (bytes.get(8..10).map(|b| usize::from(u16::from_le_bytes([b[0], b[1]]))), 10),
-        _ => (bytes.get(8..12).map(|b| u32::from_le_bytes([b[0], b[1], b[2], b[3]]) as usize), 12),
+    let (length, start): (_, usize) = match bytes.get(6).ok_or_else(short)? {
+        1 => (bytes.get(8..10), 10),
+        _ => (bytes.get(8..12), 12),
     };
-    let length = length.ok_or_else(short)?;
+    let length = length.ok_or_else(short)?.iter().rev().fold(0, |all, b| all << 8 | usize::from(*b));
     let header = bytes.get(start..start.saturating_add(length)).ok_or_else(short)?;
     let header = std::str::from_utf8(header).into_diagnostic()?;
     let data = &bytes[start + length..];
     let value = |key: &str| header.split_once(&format!("'{key}':")).map(|(_, rest)| rest.trim_start());
-    let shape = value("shape")
-        .and_then(|v| v.strip_prefix('(')?.split(')').next())
-        .ok_or_else(|| refuse("no shape"))?;
-    let shape: Vec<usize> = shape.split(',').filter_map(|n| n.trim().parse().ok()).collect();
+    let shape = value("shape").and_then(|v| v.strip_prefix('(')?.split(')').next());
+    let shape = shape.ok_or_else(|| refuse("no shape"))?.split(',');
+    let shape: Vec<usize> = shape.filter_map(|n| n.trim().parse().ok()).collect();
     let by_columns = value("fortran_order").is_some_and(|v| v.starts_with("True"));
     let descr = value("descr").ok_or_else(|| refuse("no type"))?;
-    let quoted =
-        |text: &str| -> Vec<String> { text.split('\'').skip(1).step_by(2).map(String::from).collect() };
+    let quoted = |text: &'_ str| text.split('\'').skip(1).step_by(2).map(String::from).collect::<Vec<_>>();
+    let kind = || quoted(descr).first().cloned().unwrap_or_default();
     let (names, kinds, rows) = match (descr.strip_prefix('['), &shape[..]) {
         (Some(fields), [rows]) => {
             let words = quoted(fields.split(']').next().unwrap_or_default());
-            let (names, kinds): (Vec<_>, Vec<_>) =
-                words.chunks_exact(2).map(|p| (p[0].clone(), p[1].clone())).unzip();
+            let (names, kinds) = words.chunks_exact(2).map(|p| (p[0].clone(), p[1].clone())).unzip();
             (names, kinds, *rows)
         }
-        (None, [rows]) => {
-            (vec!["#1".to_string()], vec![quoted(descr).first().cloned().unwrap_or_default()], *rows)
-        }
+        (None, [rows]) => (vec!["#1".to_string()], vec![kind()], *rows),
         // A number has a byte at least, so that a shape is no larger than its bytes.
         (None, [rows, columns]) if *rows > 0 && *columns > 0 && *columns <= data.len() => {
-            let kind = quoted(descr).first().cloned().unwrap_or_default();
-            ((1..=*columns).map(|k| format!("#{k}")).collect(), vec![kind; *columns], *rows)
+            ((1..=*columns).map(|k| format!("#{k}")).collect(), vec![kind(); *columns], *rows)
         }
         (None, [_, _]) => return Err(refuse("it is empty, or cut short")),
         _ => return Err(refuse("neither of one or two dimensions nor a list of records")),
     };
-    let size = |kind: &str| match kind {
+    let sizes = kinds.iter().map(|kind: &String| match kind.as_str() {
         "<f8" | "<i8" => Ok(8),
         "<f4" | "<i4" => Ok(4),
         other => Err(refuse(&format!("numbers of type '{other}'; '<f8', '<f4', '<i8' and '<i4' are read"))),
+    });
+    let sizes = sizes.collect::<miette::Result<Vec<usize>>>()?;
+    let mut wide = 0;
+    let offset = |size: &usize| {
+        wide += size;
+        wide - size
     };
-    let sizes = kinds.iter().map(|k| size(k)).collect::<miette::Result<Vec<usize>>>()?;
-    let wide: usize = sizes.iter().sum();
+    let offsets: Vec<usize> = sizes.iter().map(offset).collect();
     // Rows of no bytes could be any number.
     if wide == 0 || wide.checked_mul(rows) != Some(data.len()) {
         return Err(short());
     }
-    let offsets: Vec<usize> = sizes
-        .iter()
-        .scan(0, |at, s| {
-            *at += s;
-            Some(*at - s)
-        })
-        .collect();
     let cell = |row: usize, column: usize| {
         let at = if by_columns { (column * rows + row) * sizes[0] } else { row * wide + offsets[column] };
-        let b = &data[at..at + sizes[column]];
-        let eight = || [b[0], b[1], b[2], b[3], b[4], b[5], b[6], b[7]];
+        let (bytes, size) = (&data[at..], "as many bytes as its type has");
         match kinds[column].as_str() {
-            "<f8" => Cell::Number(f64::from_le_bytes(eight())),
-            "<i8" => Cell::Number(i64::from_le_bytes(eight()) as f64),
-            "<i4" => Cell::Number(f64::from(i32::from_le_bytes([b[0], b[1], b[2], b[3]]))),
-            _ => Cell::of(&format!("{:e}", f32::from_le_bytes([b[0], b[1], b[2], b[3]]))),
+            "<f8" => Cell::number(f64::from_le_bytes(*bytes.first_chunk().expect(size))),
+            "<i8" => Cell::Number(i64::from_le_bytes(*bytes.first_chunk().expect(size)) as f64),
+            "<i4" => Cell::Number(i32::from_le_bytes(*bytes.first_chunk().expect(size)).into()),
+            _ => Cell::single(f32::from_le_bytes(*bytes.first_chunk().expect(size))),
         }
-    };
-    let cell = |row, column| match cell(row, column) {
-        Cell::Number(v) if v.is_nan() => Cell::Empty,
-        cell => cell,
     };
     let row = |r| Row::new(r as u64 + 1, (0..names.len()).map(|c| cell(r, c)).collect());
     let rows: Vec<Row> = (0..rows).map(row).collect();

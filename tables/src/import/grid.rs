@@ -1,6 +1,8 @@
 //! A table of any format as cells. `head` finds where its headers are.
 
 use super::units::Unit;
+use super::values::Dropped;
+use miette::IntoDiagnostic;
 
 /// A cell.
 #[derive(Clone, Debug, PartialEq)]
@@ -18,6 +20,16 @@ pub enum Cell {
 }
 
 impl Cell {
+    /// A number as a cell; what is none is empty.
+    pub const fn number(value: f64) -> Self {
+        if value.is_nan() { Cell::Empty } else { Cell::Number(value) }
+    }
+
+    /// A single as a cell: the fewest digits stand for what was meant.
+    pub fn single(value: f32) -> Self {
+        Cell::of(&format!("{value:e}"))
+    }
+
     /// Text as a cell: blanks are taken off, marks of missing values are empty.
     pub fn of(text: &str) -> Self {
         let text = text.trim();
@@ -62,10 +74,7 @@ impl Cell {
     /// Whether it is a number, a time or a percentage.
     pub fn is_number(&self, comma: bool) -> bool {
         let written = || self.digits(comma).is_some_and(|d| Unit::SI.apply(&d).is_some());
-        matches!(self, Cell::Clock(_))
-            || written()
-            || self.ratio(comma).is_some()
-            || super::clock::is_time(self)
+        written() || self.ratio(comma).is_some() || super::clock::is_time(self)
     }
 }
 
@@ -89,6 +98,11 @@ impl Row {
     /// Cells that hold something.
     pub fn filled(&self) -> usize {
         self.cells.iter().filter(|c| **c != Cell::Empty).count()
+    }
+
+    /// What stands in its cells up to the last that holds something.
+    pub fn texts(&self) -> Vec<String> {
+        self.cells[..self.width()].iter().map(Cell::shown).collect()
     }
 
     /// Cells up to the last that holds something.
@@ -127,8 +141,8 @@ pub struct Grid {
     pub within: String,
     /// Later headers, and what they say.
     pub blocks: Vec<Block>,
-    /// Rows that are no rows of the table: line, what is there, why it was left out.
-    pub left_out: Vec<(u64, String, String)>,
+    /// Rows that are no rows of the table.
+    pub left_out: Vec<Dropped>,
     /// What was passed over or assumed while it was read.
     pub notes: Vec<String>,
 }
@@ -155,18 +169,46 @@ impl Grid {
         row.cells.get(at)
     }
 
+    /// Takes a row for none of the table.
+    pub fn leave_out(&mut self, row: &Row, reason: String) {
+        let text = row.texts().join(" ");
+        self.left_out.push(Dropped { row: row.place, column: String::new(), text, reason });
+    }
+
+    /// Names and units of the header that holds for the rows of a block; 0 is the table's own.
+    pub fn header_of(&self, block: usize) -> (&[String], &[String]) {
+        match block.checked_sub(1) {
+            None => (&self.header, &self.units),
+            Some(k) => (&self.blocks[k].header, &self.blocks[k].units),
+        }
+    }
+
     /// The table as CSV, numbers with the fewest digits that stand for them.
     pub fn csv(&self) -> miette::Result<String> {
-        use miette::IntoDiagnostic;
-        let mut writer = csv::Writer::from_writer(Vec::new());
-        writer.write_record(&self.header).into_diagnostic()?;
         let shown = |cell: &Cell| match cell {
             Cell::Number(v) => format!("{v:e}"),
             cell => cell.shown(),
         };
-        for row in &self.rows {
-            writer.write_record(row.cells.iter().map(shown)).into_diagnostic()?;
-        }
-        String::from_utf8(writer.into_inner().into_diagnostic()?).into_diagnostic()
+        csv_of(&self.header, self.rows.iter().map(|row| row.cells.iter().map(shown)))
     }
+}
+
+/// Rows of cells as CSV.
+pub fn csv_of<I: IntoIterator<Item: AsRef<[u8]>>>(
+    header: &[impl AsRef<[u8]>],
+    rows: impl Iterator<Item = I>,
+) -> miette::Result<String> {
+    let mut writer = csv::Writer::from_writer(Vec::new());
+    writer.write_record(header).into_diagnostic()?;
+    for row in rows {
+        writer.write_record(row).into_diagnostic()?;
+    }
+    String::from_utf8(writer.into_inner().into_diagnostic()?).into_diagnostic()
+}
+
+/// The one in the middle; 0 of none.
+pub fn middle(widths: impl Iterator<Item = usize>) -> usize {
+    let mut all: Vec<usize> = widths.collect();
+    all.sort_unstable();
+    all.get(all.len() / 2).copied().unwrap_or(0)
 }

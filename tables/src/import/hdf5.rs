@@ -1,6 +1,6 @@
 //! HDF5 files, MAT files of version 7.3 among them: numeric datasets of one or two dimensions, in groups too.
 
-use super::arrays::{Array, Beside, number, single, table};
+use super::arrays::{Array, Beside, table};
 use super::grid::{Cell, Grid};
 use hdf5_pure::{AttrValue, DType, Dataset, Error, File, Group, VlenStringReadOptions};
 use std::collections::HashMap;
@@ -36,23 +36,15 @@ struct Found {
 }
 
 fn texts(value: &AttrValue) -> Vec<String> {
-    value
-        .as_str()
-        .map(|one| vec![one.to_string()])
-        .or(value.as_strings().map(<[String]>::to_vec))
-        .unwrap_or_default()
+    let one = value.as_str().map(|one| vec![one.to_string()]);
+    one.or(value.as_strings().map(<[String]>::to_vec)).unwrap_or_default()
 }
 
 /// The number of an attribute, also where it is an array of one.
 fn value(value: &AttrValue) -> Option<f64> {
-    value
-        .as_f64()
-        .or_else(|| value.as_u64().map(|v| v as f64))
-        .or_else(|| value.as_i64().map(|v| v as f64))
-        .or_else(|| {
-            let all = value.to_f64s()?;
-            (all.len() == 1).then_some(all[0])
-        })
+    let whole = || value.as_u64().map(|v| v as f64).or_else(|| value.as_i64().map(|v| v as f64));
+    let only = || value.to_f64s().filter(|all| all.len() == 1).map(|all| all[0]);
+    value.as_f64().or_else(whole).or_else(only)
 }
 
 /// One text for each column: a list, or one text with commas, semicolons or blanks.
@@ -111,23 +103,16 @@ impl Found {
             [rows, columns] => (rows, columns),
             _ => return Ok(Some(format!("{name} has {} dimensions: passed over", shape.len()))),
         };
-        let count = rows.checked_mul(columns).filter(|n| *n <= self.most);
-        let Some(count) = count else {
+        let Some(count) = rows.checked_mul(columns).filter(|n| *n <= self.most) else {
             return Ok(Some(format!(
                 "{name} ({rows} x {columns}) says more than the file can hold: passed over"
             )));
         };
+        let doubles = || Ok::<_, Error>(dataset.read_f64()?.into_iter().map(Cell::number).collect());
         let cells: Vec<Cell> = match dataset.dtype()? {
-            DType::F32 => dataset.read_f32()?.into_iter().map(single).collect(),
-            DType::F64
-            | DType::I8
-            | DType::I16
-            | DType::I32
-            | DType::I64
-            | DType::U8
-            | DType::U16
-            | DType::U32
-            | DType::U64 => dataset.read_f64()?.into_iter().map(number).collect(),
+            DType::F32 => dataset.read_f32()?.into_iter().map(Cell::single).collect(),
+            DType::F64 | DType::I8 | DType::I16 | DType::I32 | DType::I64 => doubles()?,
+            DType::U8 | DType::U16 | DType::U32 | DType::U64 => doubles()?,
             DType::String if count > 1 => dataset.read_string()?.iter().map(|t| Cell::of(t)).collect(),
             DType::VariableLengthString if count > 1 => {
                 let limits = VlenStringReadOptions::new().with_max_elements(count);
@@ -148,10 +133,8 @@ impl Found {
         let mut by_columns = if self.matlab || columns == 1 {
             cells
         } else {
-            (0..columns)
-                .flat_map(|c| (0..rows).map(move |r| r * columns + c))
-                .map(|i| cells[i].clone())
-                .collect()
+            let column = |c: usize| cells[c..].iter().step_by(columns).cloned();
+            (0..columns).flat_map(column).collect()
         };
         scaled(&about, &mut by_columns);
         let units = for_columns(&about, &["units", "unit"], columns);
@@ -167,14 +150,14 @@ fn scaled(about: &HashMap<String, AttrValue>, cells: &mut [Cell]) {
     let of = |name: &str| about.get(name).and_then(value);
     let nothing: Vec<f64> = ["_FillValue", "missing_value"].into_iter().filter_map(of).collect();
     let (factor, offset) = (of("scale_factor"), of("add_offset"));
-    if nothing.is_empty() && factor.is_none() && offset.is_none() {
+    if nothing.is_empty() && factor.or(offset).is_none() {
         return;
     }
     for cell in cells {
         let Some(raw) = cell.digits(false).and_then(|d| d.parse::<f64>().ok()) else { continue };
         if nothing.contains(&raw) {
             *cell = Cell::Empty;
-        } else if factor.is_some() || offset.is_some() {
+        } else if factor.or(offset).is_some() {
             *cell = Cell::Number(raw * factor.unwrap_or(1.0) + offset.unwrap_or(0.0));
         }
     }

@@ -1,7 +1,7 @@
 //! MAT files of version 5 (the form that MATLAB writes with `-v7` and `-v6`, and scipy.io.savemat): numeric
 //! arrays, also within structures. 'MAT-File Format', The MathWorks, chapter 1. Version 7.3 is HDF5.
 
-use super::arrays::{Array, Beside, number, single, table};
+use super::arrays::{Array, Beside, table};
 use super::grid::{Cell, Grid};
 use flate2::read::ZlibDecoder;
 use std::io::Read;
@@ -35,19 +35,15 @@ pub fn read(bytes: &[u8], sheet: Option<&str>, wanted: &[String]) -> miette::Res
     let mut rest = &bytes[128..];
     while rest.len() >= 8 {
         let element = Element::next(&mut rest, big).ok_or_else(cut)?;
-        let unfolded = match element.kind {
-            COMPRESSED => {
-                let mut unfolded = Vec::new();
-                let read = ZlibDecoder::new(element.data).take(most as u64).read_to_end(&mut unfolded);
-                read.map_err(|_| cut())?;
-                most -= unfolded.len();
-                if most == 0 {
-                    return Err(super::too_many("the MAT file", unfolded.len() / 8, bytes.len()));
-                }
-                unfolded
+        let mut unfolded = Vec::new();
+        if element.kind == COMPRESSED {
+            let read = ZlibDecoder::new(element.data).take(most as u64).read_to_end(&mut unfolded);
+            read.map_err(|_| cut())?;
+            most -= unfolded.len();
+            if most == 0 {
+                return Err(super::too_many("the MAT file", unfolded.len() / 8, bytes.len()));
             }
-            _ => Vec::new(),
-        };
+        }
         let mut inside = &unfolded[..];
         let element =
             if unfolded.is_empty() { element } else { Element::next(&mut inside, big).ok_or_else(cut)? };
@@ -94,44 +90,41 @@ impl<'a> Element<'a> {
     /// Its codes as text: bytes, UTF-16 or UTF-8 by the type.
     fn codes(&self, big: bool) -> Option<String> {
         match self.kind {
-            1 | 2 | 16 => Some(String::from_utf8_lossy(self.data).into_owned()),
+            1 | 2 | 16 => Some(self.text()),
             4 | 17 => {
-                let code = |c: &[u8]| {
-                    if big { u16::from_be_bytes([c[0], c[1]]) } else { u16::from_le_bytes([c[0], c[1]]) }
-                };
-                Some(String::from_utf16_lossy(&self.data.chunks_exact(2).map(code).collect::<Vec<_>>()))
+                let read = if big { u16::from_be_bytes } else { u16::from_le_bytes };
+                let codes = self.data.as_chunks().0.iter().map(|bytes| read(*bytes));
+                Some(String::from_utf16_lossy(&codes.collect::<Vec<_>>()))
             }
             _ => None,
         }
     }
 
     fn cells(&self, big: bool) -> Option<Vec<Cell>> {
-        macro_rules! numbers {
-            ($type:ty, $cell:expr) => {
-                self.data
-                    .chunks_exact(size_of::<$type>())
-                    .map(|chunk| {
-                        let bytes = chunk.try_into().expect("a chunk of that size");
-                        let value =
-                            if big { <$type>::from_be_bytes(bytes) } else { <$type>::from_le_bytes(bytes) };
-                        $cell(value)
-                    })
-                    .collect()
-            };
+        macro_rules! cells {
+            ($type:ty, $cell:expr) => {{
+                let read = if big { <$type>::from_be_bytes } else { <$type>::from_le_bytes };
+                self.data.as_chunks().0.iter().map(|bytes| $cell(read(*bytes))).collect()
+            }};
         }
         Some(match self.kind {
-            1 => numbers!(i8, |v| number(f64::from(v))),
-            2 => numbers!(u8, |v| number(f64::from(v))),
-            3 => numbers!(i16, |v| number(f64::from(v))),
-            4 => numbers!(u16, |v| number(f64::from(v))),
-            5 => numbers!(i32, |v| number(f64::from(v))),
-            6 => numbers!(u32, |v| number(f64::from(v))),
-            7 => numbers!(f32, single),
-            9 => numbers!(f64, number),
-            12 => numbers!(i64, |v| number(v as f64)),
-            13 => numbers!(u64, |v| number(v as f64)),
+            1 => cells!(i8, |v| Cell::number(f64::from(v))),
+            2 => cells!(u8, |v| Cell::number(f64::from(v))),
+            3 => cells!(i16, |v| Cell::number(f64::from(v))),
+            4 => cells!(u16, |v| Cell::number(f64::from(v))),
+            5 => cells!(i32, |v| Cell::number(f64::from(v))),
+            6 => cells!(u32, |v| Cell::number(f64::from(v))),
+            7 => cells!(f32, Cell::single),
+            9 => cells!(f64, Cell::number),
+            12 => cells!(i64, |v| Cell::number(v as f64)),
+            13 => cells!(u64, |v| Cell::number(v as f64)),
             _ => return None,
         })
+    }
+
+    /// Its bytes as text.
+    fn text(&self) -> String {
+        String::from_utf8_lossy(self.data).into_owned()
     }
 }
 
@@ -150,16 +143,16 @@ fn matrix(
     let flags = word(Element::next(&mut rest, big)?.data, big)?;
     let (class, marks) = (flags as u8, (flags >> 8) as u8);
     if class == OPAQUE {
-        let name = String::from_utf8_lossy(Element::next(&mut rest, big)?.data).into_owned();
+        let name = Element::next(&mut rest, big)?.text();
         let kind = Element::next(&mut rest, big).and_then(|_| Element::next(&mut rest, big));
-        let kind = kind.map(|e| String::from_utf8_lossy(e.data).into_owned()).unwrap_or_default();
+        let kind = kind.map(|e| e.text()).unwrap_or_default();
         beside.notes.push(unread(&name, &kind, ""));
         return Some(());
     }
     let sizes = Element::next(&mut rest, big)?;
     let sizes: Vec<usize> =
         sizes.data.chunks_exact(4).map(|c| word(c, big).map_or(0, |n| n as usize)).collect();
-    let own = String::from_utf8_lossy(Element::next(&mut rest, big)?.data).into_owned();
+    let own = Element::next(&mut rest, big)?.text();
     let name = match (around.is_empty(), own.is_empty()) {
         (true, _) => own,
         (false, true) => around.to_string(),

@@ -1,5 +1,6 @@
 //! What is remarked of a table: ranges in SI, units that look slipped, signs that look wrong. Nothing is repaired.
 
+use super::values::{all_differ, middle, sorted};
 use diagnosis::data::{DataError, Table};
 use models::condition::Condition;
 use models::covariate::{self, Covariate};
@@ -36,25 +37,15 @@ const PLATE_SPEED: f64 = 10.0;
 /// Whether values are those of a tribometer, as far as a range is known for the column.
 pub fn usual(column: &str, values: &[f64]) -> bool {
     let sizes = sorted(values.iter().map(|v| v.abs()).filter(|v| *v > 0.0));
-    let within = |[low, high]: [f64; 2]| sizes.get(sizes.len() / 2).is_none_or(|v| (low..=high).contains(v));
+    let within = |[low, high]: [f64; 2]| middle(&sizes).is_none_or(|v| (low..=high).contains(&v));
     USUAL.iter().find(|(c, _)| c.name == column).is_none_or(|(_, range)| within(*range))
-}
-
-fn sorted(values: impl Iterator<Item = f64>) -> Vec<f64> {
-    let mut all: Vec<f64> = values.collect();
-    all.sort_by(f64::total_cmp);
-    all
-}
-
-fn lateral(passes: &[Pass]) -> impl Iterator<Item = f64> {
-    passes.iter().filter_map(|p| p.lateral_force_n)
 }
 
 /// The range of every column that the table has.
 pub fn ranges(passes: &[Pass], columns: &[&'static str]) -> Vec<Range> {
     let of = |c: &Covariate| sorted(passes.iter().filter_map(|p| c.of(&p.condition(1.0))));
     let lists = covariate::REQUIRED.iter().chain(covariate::OPTIONAL.iter()).map(|c| (c.name, of(c)));
-    let all = lists.chain([("lateral_force_n", sorted(lateral(passes)))]);
+    let all = lists.chain([("lateral_force_n", sorted(passes.iter().filter_map(|p| p.lateral_force_n)))]);
     all.filter(|(name, v)| columns.contains(name) && !v.is_empty())
         .map(|(column, v)| Range { column, low_median_high: [v[0], v[v.len() / 2], v[v.len() - 1]] })
         .collect()
@@ -104,12 +95,11 @@ pub fn remarks(passes: &[Pass], columns: &[&'static str]) -> Vec<String> {
     for (c, usual) in USUAL.iter().filter(|(c, _)| columns.contains(&c.name)) {
         let sizes = sorted(conditions.iter().filter_map(|q| c.of(q)).map(f64::abs).filter(|v| *v > 0.0));
         // Places are judged by the largest: a table may lie about zero.
-        let typical =
-            if c.name == covariate::POSITION.name { sizes.last() } else { sizes.get(sizes.len() / 2) };
-        let Some(typical) = typical else { continue };
-        if let Some(words) = slip(*typical, *usual) {
+        let place = c.name == covariate::POSITION.name;
+        let typical = if place { sizes.last().copied() } else { middle(&sizes) };
+        if let Some((typical, words)) = typical.and_then(|v| Some((v, slip(v, *usual)?))) {
             let (factor, unit) = c.shown;
-            let [typical, low, high] = [*typical, usual[0], usual[1]].map(|v| number(v * factor));
+            let [typical, low, high] = [typical, usual[0], usual[1]].map(|v| number(v * factor));
             list.push(format!(
                 "{}: {typical} {unit} is {words} for a tribometer ({low} to {high} {unit}): is its unit right?",
                 c.name
@@ -117,11 +107,9 @@ pub fn remarks(passes: &[Pass], columns: &[&'static str]) -> Vec<String> {
         }
     }
     let ratios = sorted(passes.iter().filter_map(|p| Some((p.lateral_force_n? / p.normal_force_n).abs())));
-    if let Some(words) = ratios.get(ratios.len() / 2).and_then(|r| slip(*r, RATIO).map(|w| (r, w))) {
+    if let Some((ratio, words)) = middle(&ratios).and_then(|r| Some((number(r), slip(r, RATIO)?))) {
         list.push(format!(
-            "lateral over normal force is {}, {} for friction: is the unit of one of them wrong?",
-            number(*words.0),
-            words.1
+            "lateral over normal force is {ratio}, {words} for friction: is the unit of one of them wrong?"
         ));
     }
     let fastest = conditions.iter().map(|c| std::f64::consts::PI * c.frequency_hz * c.amplitude.metres());
@@ -133,9 +121,8 @@ pub fn remarks(passes: &[Pass], columns: &[&'static str]) -> Vec<String> {
         ));
     }
     list.extend(hidden_reversals(passes));
-    let mut runs: Vec<_> = passes.iter().filter_map(|p| p.run.as_deref()).collect();
-    runs.sort_unstable();
-    if passes.len() > 3 && runs.len() == passes.len() && runs.windows(2).all(|pair| pair[0] != pair[1]) {
+    let runs: Vec<&str> = passes.iter().filter_map(|p| p.run.as_deref()).collect();
+    if runs.len() == passes.len() && all_differ(runs) {
         list.push("every pass is a run of its own: if the column 'run' counts the rows, leave it out".into());
     }
     match Table::measured(passes) {

@@ -18,6 +18,8 @@ pub enum ColumnKind {
 /// One thing that a column can stand for.
 #[derive(Debug)]
 pub struct Target {
+    /// Which one it is.
+    pub id: Id,
     /// Name in `--map` and `--set`.
     pub name: &'static str,
     /// Column of the point table that it gives.
@@ -27,7 +29,7 @@ pub struct Target {
     /// What it is.
     pub words: &'static str,
     /// Headers that usually mean it: small letters and digits, the unit taken off.
-    headers: &'static [&'static str],
+    pub headers: &'static [&'static str],
 }
 
 macro_rules! targets {
@@ -40,7 +42,7 @@ macro_rules! targets {
         pub const COUNT: usize = [$($name),*].len();
         /// Every target, in the order of presentation.
         pub static TARGETS: &[Target] =
-            &[$(Target { name: $name, column: $column, kind: $kind, words: $words, headers: &[$($header),*] }),*];
+            &[$(Target { id: Id::$id, name: $name, column: $column, kind: $kind, words: $words, headers: &[$($header),*] }),*];
     };
 }
 
@@ -83,21 +85,24 @@ impl Id {
 
 impl Target {
     /// The target of that name, or of that column of the point table.
-    pub fn named(name: &str) -> Option<usize> {
-        let exact = TARGETS.iter().position(|t| t.name == name);
-        exact.or_else(|| TARGETS.iter().position(|t| t.column == name))
+    pub fn named(name: &str) -> Option<&'static Target> {
+        let exact = TARGETS.iter().find(|t| t.name == name);
+        exact.or_else(|| TARGETS.iter().find(|t| t.column == name))
     }
 
-    /// Headers that usually mean it, without case, blanks, marks and unit.
-    pub const fn headers(&self) -> &'static [&'static str] {
-        self.headers
+    /// The target that a header usually means.
+    pub fn headed(header: &str) -> Option<&'static Target> {
+        let plain = plain(header);
+        let is = |name: &str| self::plain(name) == plain;
+        TARGETS.iter().find(|t| is(t.name) || is(t.column) || t.headers.contains(&plain.as_str()))
     }
 
-    /// Whether a header, made plain by [`plain`], usually means this.
-    pub fn is_headed(&self, plain: &str) -> bool {
-        let column: String = self.column.chars().filter(char::is_ascii_alphanumeric).collect();
-        let name: String = self.name.chars().filter(char::is_ascii_alphanumeric).collect();
-        plain == name || plain == column || self.headers.contains(&plain)
+    /// What its numbers measure.
+    pub const fn dimension(&self) -> Option<Dimension> {
+        match self.kind {
+            Number(dimension) => Some(dimension),
+            _ => None,
+        }
     }
 }
 

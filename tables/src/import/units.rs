@@ -2,6 +2,11 @@
 //! and rounds once, as if the SI value had been written; any other takes one multiplication or division more.
 
 use std::f64::consts::PI;
+use symbols::UNITS;
+
+mod symbols;
+
+pub use symbols::is_unit;
 
 /// What a column measures, and so which units it can have.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -51,6 +56,18 @@ impl Dimension {
             Dimension::Ratio => "1, %",
         }
     }
+
+    /// The units that take the prefixes of the SI, each with its power of ten.
+    const fn bases(self) -> &'static [(&'static str, i32)] {
+        match self {
+            Dimension::Length => &[("m", 0)],
+            Dimension::Time => &[("s", 0)],
+            Dimension::Frequency => &[("Hz", 0)],
+            Dimension::Force => &[("N", 0), ("dyn", -5)],
+            Dimension::Pressure => &[("Pa", 0), ("bar", 5)],
+            _ => &[],
+        }
+    }
 }
 
 /// A unit: `SI = number * 10^ten * times / over + plus`.
@@ -97,70 +114,18 @@ impl Unit {
                 Self::parse(dimension, rest).or_else(|| Self::parse(dimension, rest.rsplit_once('/')?.0))?;
             return (unit.plus == 0.0).then_some(Unit { times: unit.times * factor, ..unit });
         }
-        match dimension {
-            Dimension::Length => match text {
-                "micron" | "microns" => Some(Unit::ten(-6)),
-                "in" | "inch" => Some(Unit::times(254.0, -4)),
-                "mil" => Some(Unit::times(254.0, -7)),
-                _ => prefixed(text, &[("m", 0)]),
-            },
-            Dimension::Time => match text {
-                "sec" | "seconds" => Some(Unit::SI),
-                "min" | "minutes" => Some(Unit::times(60.0, 0)),
-                "hh:mm:ss" | "h:mm:ss" | "hh:mm" | "mm:ss" => Some(Unit::SI),
-                "h" | "hr" | "hours" => Some(Unit::times(3600.0, 0)),
-                _ => prefixed(text, &[("s", 0)]),
-            },
-            Dimension::Frequency => match text {
-                "rpm" | "1/min" => Some(Unit::over(60.0)),
-                "rad/s" => Some(Unit::over(2.0 * PI)),
-                "1/s" => Some(Unit::SI),
-                _ => prefixed(text, &[("Hz", 0)]),
-            },
-            Dimension::Speed => {
-                let (way, time) = text.split_once('/')?;
-                let (way, time) = (Self::parse(Dimension::Length, way)?, Self::parse(Dimension::Time, time)?);
-                let (times, over) = (way.times * time.over, way.over * time.times);
-                Some(Unit { ten: way.ten - time.ten, times, over, plus: 0.0 })
-            }
-            Dimension::Force => match text {
-                // Loads are often stated as the mass that hangs there.
-                "gf" | "g" | "gram" | "grams" | "gram-force" | "grf" | "p" | "pond" => {
-                    Some(Unit::times(980_665.0, -8))
-                }
-                "mgf" | "mg" => Some(Unit::times(980_665.0, -11)),
-                "kgf" | "kg" | "kp" => Some(Unit::times(980_665.0, -5)),
-                "lbf" | "lb" | "lbs" => Some(Unit::times(4.448_221_615_260_5, 0)),
-                _ => prefixed(text, &[("N", 0), ("dyn", -5)]),
-            },
-            Dimension::Pressure => match text {
-                "atm" => Some(Unit::times(101_325.0, 0)),
-                "psi" => Some(Unit::times(6_894.757_293_168, 0)),
-                "Torr" | "torr" | "mmHg" => Some(Unit { times: 101_325.0, ..Unit::over(760.0) }),
-                _ => prefixed(text, &[("Pa", 0), ("bar", 5)]),
-            },
-            Dimension::Temperature => match text.trim_start_matches("deg").trim_start_matches('°') {
-                "C" | "celsius" | "Celsius" => Some(Unit::SI),
-                "K" | "kelvin" => Some(Unit { plus: -273.15, ..Unit::SI }),
-                "F" => Some(Unit { plus: -32.0 / 1.8, ..Unit::over(1.8) }),
-                _ => None,
-            },
-            Dimension::Percentage => match text {
-                "%" | "pct" | "percent" | "%RH" | "%rh" => Some(Unit::SI),
-                "1" => Some(Unit::ten(2)),
-                _ => None,
-            },
-            Dimension::Angle => match text {
-                "deg" | "°" | "degrees" => Some(Unit::SI),
-                "rad" => Some(Unit { times: 180.0, ..Unit::over(PI) }),
-                _ => None,
-            },
-            Dimension::Ratio => match text {
-                "" | "1" | "-" | "–" | "—" | "N/N" => Some(Unit::SI),
-                "%" => Some(Unit::ten(-2)),
-                _ => None,
-            },
+        if let (Dimension::Speed, Some((way, time))) = (dimension, text.split_once('/')) {
+            let (way, time) = (Self::parse(Dimension::Length, way)?, Self::parse(Dimension::Time, time)?);
+            let (times, over) = (way.times * time.over, way.over * time.times);
+            return Some(Unit { ten: way.ten - time.ten, times, over, plus: 0.0 });
         }
+        let text = if dimension == Dimension::Temperature {
+            text.trim_start_matches("deg").trim_start_matches('°')
+        } else {
+            text
+        };
+        let named = UNITS.iter().find(|(of, names, _)| *of == dimension && names.contains(&text));
+        named.map(|(.., unit)| *unit).or_else(|| prefixed(text, dimension.bases()))
     }
 
     /// A turn, a rate of turns or a torque on an arm that is a length with its unit.
@@ -250,37 +215,6 @@ fn factored(text: &str) -> Option<(f64, &str)> {
         .then_some((number, rest))
 }
 
-/// Symbols of units, of quantities that no target has among them, and words that stand in their place.
-const SYMBOLS: &[&str] = &[
-    "m", "s", "g", "N", "Pa", "V", "A", "J", "W", "K", "C", "ohm", "\u{3a9}", "\u{2126}", "Hz", "rad", "deg",
-    "°", "°C", "°F", "degC", "degF", "%", "min", "h", "hr", "sec", "rpm", "rev", "revs", "cycle", "cycles",
-    "count", "counts", "cts", "digit", "digits", "bit", "bits", "LSB", "lb", "lbs", "lbf", "in", "inch",
-    "ft", "mil", "psi", "bar", "atm", "Torr", "mmHg", "ppm", "ppb", "a.u.", "au", "arb.", "n/a", "-", "1",
-    "none", "Nm", "Nmm", "Ncm", "Ns", "Wh", "Ah", "VA", "gf", "kgf", "kp", "dyn", "eV", "l", "L", "St", "P",
-    "dB", "pct", "percent", "micron", "microns", "px", "step", "steps", "hh:mm:ss", "hh:mm", "mm:ss",
-    "h:mm:ss", "x",
-];
-
-/// Whether a text can stand in a row of units: symbols of any quantity, with prefixes, exponents, products and quotients.
-pub fn is_unit(text: &str) -> bool {
-    let text = text.trim().trim_matches(['[', ']', '(', ')']).trim();
-    let symbol =
-        |t: &str| SYMBOLS.iter().any(|s| *s == t || t.len() > 1 && s.len() > 1 && s.eq_ignore_ascii_case(t));
-    if text.is_empty() || symbol(text) {
-        return true;
-    }
-    let with_prefix = |t: &str| {
-        let rest = t.strip_prefix(['n', 'u', '\u{b5}', '\u{3bc}', 'm', 'c', 'd', 'h', 'k', 'M', 'G']);
-        symbol(t) || rest.is_some_and(|rest| SYMBOLS.contains(&rest) && rest.chars().all(char::is_alphabetic))
-    };
-    let exponent = |c: char| c.is_ascii_digit() || "^-+²³¹⁻".contains(c);
-    text.chars().count() <= 12
-        && text.split(['/', '*', '·', ' ', '.']).all(|t| {
-            let bare = t.trim_end_matches(exponent);
-            with_prefix(if bare.is_empty() { t } else { bare })
-        })
-}
-
 /// Without brackets, with one spelling of micro and of 'per second'.
 fn plain(text: &str) -> String {
     let text = text.trim().trim_matches(['[', ']', '(', ')']).trim_matches([',', ';', ' ']);
@@ -331,85 +265,4 @@ fn moved(number: &str, ten: i32) -> Option<f64> {
 }
 
 #[cfg(test)]
-mod tests {
-    use super::*;
-
-    fn si(dimension: Dimension, unit: &str, number: &str) -> f64 {
-        let unit = Unit::parse(dimension, unit).unwrap_or_else(|| panic!("{unit}"));
-        unit.apply(number).unwrap_or_else(|| panic!("{number}"))
-    }
-
-    /// Moving the point is exact where a multiplication is not: `0.7 * 1e-6` is no `7e-7`.
-    #[test]
-    fn powers_of_ten_keep_the_last_digit() {
-        for k in 1..5000 {
-            let text = format!("{}.{:03}", k / 1000, k % 1000);
-            let wanted: f64 = format!("{text}e-6").parse().unwrap();
-            assert_eq!(si(Dimension::Length, "µm", &text), wanted);
-            assert_eq!(si(Dimension::Speed, "um s^-1", &text), wanted);
-        }
-        assert_eq!(si(Dimension::Force, "mN", "-2.5E2"), -0.25);
-        assert_eq!(si(Dimension::Force, "-mN", "-2.5E2"), 0.25);
-        assert_eq!(si(Dimension::Frequency, "kHz", "27.5"), 27_500.0);
-        assert_eq!(si(Dimension::Pressure, "hPa", "1013.25"), 101_325.0);
-        assert_eq!(si(Dimension::Speed, "m/ms", "2"), 2000.0);
-    }
-
-    #[test]
-    fn other_units_are_right_to_a_rounding() {
-        let near = |a: f64, b: f64| assert!((a - b).abs() <= b.abs() * 3e-16, "{a} {b}");
-        near(si(Dimension::Speed, "mm/min", "60"), 0.001);
-        near(si(Dimension::Force, "gf", "100"), 0.980_665);
-        near(si(Dimension::Force, "12.5 N/V", "2"), 25.0);
-        near(si(Dimension::Force, "-12.5*N", "2"), -25.0);
-        near(si(Dimension::Force, "N·m@20mm", "0.1"), 5.0);
-        near(si(Dimension::Speed, "rpm@20 mm", "60"), 0.04 * PI);
-        near(si(Dimension::Speed, "rad/s@0.02m", "3"), 0.06);
-        near(si(Dimension::Length, "rev@20mm", "0.5"), 0.02 * PI);
-        near(si(Dimension::Frequency, "rpm", "200"), 200.0 / 60.0);
-        near(si(Dimension::Temperature, "K", "300"), 300.0 - 273.15);
-        assert!((si(Dimension::Temperature, "°F", "212") - 100.0).abs() < 1e-12);
-        near(si(Dimension::Angle, "rad", "1"), 180.0 / PI);
-        near(si(Dimension::Percentage, "1", "0.5"), 50.0);
-        near(si(Dimension::Pressure, "Torr", "760"), 101_325.0);
-    }
-
-    #[test]
-    fn rows_of_units_may_hold_any_quantity() {
-        for unit in [
-            "ohm", "kΩ", "mV", "N/mm", "m/s2", "m/s²", "mm^3", "J", "Nmm", "rev", "counts", "GPa", "ppm",
-            "a.u.", "[µm]", "mm·s-1",
-        ] {
-            assert!(is_unit(unit), "{unit}");
-        }
-        for name in ["Time", "Load", "Fx", "speed", "t", "F", "mu", "Step 2"] {
-            assert!(!is_unit(name), "{name}");
-        }
-    }
-
-    #[test]
-    fn what_is_no_number_and_no_unit_is_refused() {
-        for text in ["", ".", "-", "1,5", "nan", "inf", "1e400", "--1", "1.5 N", "0x10", "1e", "1.2.3"] {
-            assert_eq!(Unit::SI.apply(text), None, "{text}");
-        }
-        for (dimension, text) in [
-            (Dimension::Length, "N"),
-            (Dimension::Force, "mm"),
-            (Dimension::Speed, "mm"),
-            (Dimension::Time, ""),
-        ] {
-            assert_eq!(Unit::parse(dimension, text), None, "{text}");
-        }
-        for (dimension, written, meant) in [
-            (Dimension::Force, "MN", "mN"),
-            (Dimension::Force, "mn", "mN"),
-            (Dimension::Frequency, "KHZ", "kHz"),
-            (Dimension::Speed, "MM/S", "mm/s"),
-            (Dimension::Length, "[µm]", "um"),
-        ] {
-            let unit = Unit::parse(dimension, meant).unwrap();
-            assert_eq!(Unit::guess(dimension, written), Some((meant.to_string(), unit)), "{written}");
-        }
-        assert_eq!(Unit::parse(Dimension::Force, "MN"), Some(Unit::ten(6)));
-    }
-}
+mod tests;

@@ -2,7 +2,7 @@
 
 use super::grid::{Cell, Grid, Row};
 use super::map::{Map, way};
-use super::targets::{COUNT, ColumnKind, Id, TARGETS};
+use super::targets::{COUNT, ColumnKind, Id};
 use super::units::{Dimension, Unit};
 use models::condition::Condition;
 use models::covariate;
@@ -28,7 +28,7 @@ pub struct Dropped {
     pub reason: String,
 }
 
-/// What a row says, in SI, by the places of [`TARGETS`].
+/// What a row says, in SI, by the places of the targets.
 #[derive(Clone, Debug)]
 pub struct Values {
     /// Line or row of the source.
@@ -43,6 +43,24 @@ pub struct Values {
 pub fn mean(rows: &[Values], of: impl Fn(&Values) -> Option<f64>) -> Option<f64> {
     let known: Vec<f64> = rows.iter().filter_map(of).collect();
     (!known.is_empty()).then(|| known.iter().sum::<f64>() / known.len() as f64)
+}
+
+/// Numbers from the least to the largest.
+pub fn sorted(values: impl Iterator<Item = f64>) -> Vec<f64> {
+    let mut all: Vec<f64> = values.collect();
+    all.sort_by(f64::total_cmp);
+    all
+}
+
+/// The one in the middle of sorted numbers.
+pub fn middle(sorted: &[f64]) -> Option<f64> {
+    sorted.get(sorted.len() / 2).copied()
+}
+
+/// Whether values are too many to be alike by chance, and no two of them are.
+pub fn all_differ(mut values: Vec<impl Ord>) -> bool {
+    values.sort_unstable();
+    values.len() > 3 && values.windows(2).all(|pair| pair[0] != pair[1])
 }
 
 impl Values {
@@ -64,10 +82,10 @@ impl Values {
     ) -> Result<Self, Dropped> {
         let mut values = Values { place: row.place, numbers: [f64::NAN; COUNT], run: None };
         for constant in &map.constants {
-            if TARGETS[constant.target].kind == ColumnKind::Text {
+            if constant.target.kind == ColumnKind::Text {
                 values.run = Some(constant.text.clone());
             } else {
-                values.numbers[constant.target] = constant.value;
+                values.numbers[constant.target.id as usize] = constant.value;
             }
         }
         if map.time_by_rows {
@@ -81,7 +99,7 @@ impl Values {
                 text: cell.shown(),
                 reason: reason.into(),
             };
-            let number = || match (cell.ratio(grid.comma), TARGETS[column.target].kind) {
+            let number = || match (cell.ratio(grid.comma), column.target.kind) {
                 (None, _) => cell.digits(grid.comma).and_then(|d| column.unit.apply(&d)),
                 // A minus before a unit turns these too.
                 (Some(ratio), ColumnKind::Number(Dimension::Ratio)) => {
@@ -93,7 +111,7 @@ impl Values {
                 }
                 _ => None,
             };
-            let value = match TARGETS[column.target].kind {
+            let value = match column.target.kind {
                 ColumnKind::Text => {
                     values.run = Some(cell.shown());
                     continue;
@@ -106,12 +124,12 @@ impl Values {
                     let whole = |v: &f64| v.fract() == 0.0 && (0.0..9e15).contains(v);
                     number().filter(whole).ok_or_else(|| drop("no whole number"))?
                 }
-                ColumnKind::Number(_) if column.target == Id::Time as usize => {
+                ColumnKind::Number(_) if column.target.id == Id::Time => {
                     clock.or_else(number).ok_or_else(|| drop(NO_TIME))?
                 }
                 ColumnKind::Number(_) => number().ok_or_else(|| drop(NO_NUMBER))?,
             };
-            values.numbers[column.target] = value;
+            values.numbers[column.target.id as usize] = value;
         }
         Ok(values)
     }
@@ -159,7 +177,8 @@ impl Values {
         self.get(Id::LateralForce).or_else(friction).or_else(coefficient)
     }
 
-    fn drop(&self, column: &str, value: Option<f64>, reason: &str) -> Dropped {
+    /// The row as one that is left out for what it has in a column.
+    pub fn drop(&self, column: &str, value: Option<f64>, reason: &str) -> Dropped {
         let text = value.map(|v| v.to_string()).unwrap_or_default();
         Dropped { row: self.place, column: column.into(), text, reason: reason.into() }
     }

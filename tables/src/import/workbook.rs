@@ -2,7 +2,9 @@
 
 use super::grid::{Cell, Grid, Row};
 use super::head::Source;
+use super::units::Unit;
 use miette::IntoDiagnostic;
+use std::collections::BTreeMap;
 
 mod unfolded;
 
@@ -24,36 +26,27 @@ pub fn read(bytes: &[u8], sheet: Option<&str>) -> miette::Result<Grid> {
         Some(name) => names.iter().find(|n| *n == name),
         None if names.len() == 1 => names.first(),
         None => {
-            let mut filled = Vec::new();
-            for name in &names {
-                if sheet_rows(&mut book, name, bytes.len(), &percents).is_ok_and(|(rows, _)| !rows.is_empty())
-                {
-                    filled.push(name);
-                }
-            }
-            if filled.len() == 1 { filled.pop() } else { None }
+            let mut rows_of = |name: &str| sheet_rows(&mut book, name, bytes.len(), &percents);
+            let mut filled =
+                names.iter().filter(|name| rows_of(name).is_ok_and(|(rows, _)| !rows.is_empty()));
+            filled.next().filter(|_| filled.next().is_none())
         }
     };
     let Some(name) = named.cloned() else {
         let listed = names.iter().map(|n| format!("'{n}'")).collect::<Vec<_>>().join(", ");
-        match sheet {
-            Some(sheet) => {
-                miette::bail!(help = format!("its sheets: {listed}"), "the workbook has no sheet '{sheet}'")
-            }
-            None => miette::bail!(
-                help = format!("name one with --sheet: {listed}"),
-                "the workbook has several sheets"
-            ),
-        }
+        let (help, why) = match sheet {
+            Some(sheet) => ("its sheets", format!("the workbook has no sheet '{sheet}'")),
+            None => ("name one with --sheet", "the workbook has several sheets".to_string()),
+        };
+        miette::bail!(help = format!("{help}: {listed}"), "{why}");
     };
     let (rows, formulas) = sheet_rows(&mut book, &name, bytes.len(), &percents)?;
     // Numbers that were typed as text follow the mark of the country.
-    let text_with_comma = |c: &Cell| matches!(c, Cell::Text(t) if t.contains(',') && !t.contains('.'));
-    let comma = rows.iter().any(|r| {
-        r.cells.iter().any(|c| {
-            text_with_comma(c) && c.digits(true).is_some_and(|d| super::units::Unit::SI.apply(&d).is_some())
-        })
-    });
+    let with_comma = |c: &Cell| {
+        matches!(c, Cell::Text(t) if t.contains(',') && !t.contains('.'))
+            && c.digits(true).is_some_and(|d| Unit::SI.apply(&d).is_some())
+    };
+    let comma = rows.iter().any(|r| r.cells.iter().any(with_comma));
     let source =
         Source { format: format!("workbook, sheet '{name}'"), comma, places: true, ..Source::default() };
     let mut grid = source.find(rows);
@@ -81,16 +74,17 @@ fn sheet_rows(
     percents: &[Percents],
 ) -> miette::Result<(Vec<Row>, usize)> {
     use calamine::{Data, DataRef, Reader, Sheets};
-    let cell = |data: Data| match data {
-        Data::Int(v) => Cell::Number(v as f64),
-        Data::Float(v) => Cell::Number(v),
-        Data::Bool(v) => Cell::Number(f64::from(u8::from(v))),
+    let number = |v: f64, percent: bool| if percent { Cell::Percent(v) } else { Cell::Number(v) };
+    let cell = |data: Data, percent: bool| match data {
+        Data::Int(v) => number(v as f64, percent),
+        Data::Float(v) => number(v, percent),
+        Data::Bool(v) => number(f64::from(u8::from(v)), percent),
         Data::DateTime(v) => Cell::Clock(v.as_f64() * DAY_S),
         Data::String(text) | Data::DateTimeIso(text) | Data::DurationIso(text) => Cell::of(&text),
         Data::Error(error) => Cell::Text(format!("{error}")),
         Data::Empty => Cell::Empty,
     };
-    let mut sheet = Sheet { rows: Vec::new(), cells: 0, size };
+    let mut sheet = Sheet { rows: BTreeMap::new(), cells: 0, size };
     let mut formulas = 0;
     match book {
         Sheets::Xlsx(book) => {
@@ -99,11 +93,8 @@ fn sheet_rows(
                 .map(|s| s.number_format.as_ref().is_some_and(|f| f.format_code.contains('%')))
                 .collect();
             while let Some((one, style)) = reader.next_cell_with_style_id().into_diagnostic()? {
-                let value = match cell(Data::from(one.get_value().clone())) {
-                    Cell::Number(v) if percent.get(style) == Some(&true) => Cell::Percent(v),
-                    value => value,
-                };
-                sheet.put(one.get_position(), value)?;
+                let percent = percent.get(style) == Some(&true);
+                sheet.put(one.get_position(), cell(Data::from(one.get_value().clone()), percent))?;
             }
             drop(reader);
             let mut reader = book.worksheet_cells_reader(name).into_diagnostic()?;
@@ -117,7 +108,7 @@ fn sheet_rows(
         Sheets::Xlsb(book) => {
             let mut reader = book.worksheet_cells_reader(name).into_diagnostic()?;
             while let Some(one) = reader.next_cell().into_diagnostic()? {
-                sheet.put(one.get_position(), cell(Data::from(one.get_value().clone())))?;
+                sheet.put(one.get_position(), cell(Data::from(one.get_value().clone()), false))?;
             }
         }
         Sheets::Xls(_) | Sheets::Ods(_) => {
@@ -125,24 +116,24 @@ fn sheet_rows(
             let (top, left) = range.start().unwrap_or_default();
             for (row, column, value) in range.used_cells() {
                 let place = (top as usize + row, left as usize + column);
-                let value = match cell(value.clone()) {
-                    Cell::Number(v) if percents.iter().any(|p| p.holds(name, place)) => Cell::Percent(v),
-                    value => value,
-                };
-                sheet.put((place.0 as u32, place.1 as u32), value)?;
+                let percent = percents.iter().any(|p| p.holds(name, place));
+                sheet.put((place.0 as u32, place.1 as u32), cell(value.clone(), percent))?;
             }
         }
     }
-    sheet.rows.sort_by_key(|row| row.place);
-    let blank = |row: &Row| row.cells.iter().position(|c| *c != Cell::Empty);
-    let left = sheet.rows.iter().filter_map(blank).min().unwrap_or(0);
-    sheet.rows.iter_mut().for_each(|row| drop(row.cells.drain(..left.min(row.cells.len()))));
-    Ok((sheet.rows, formulas))
+    let blank = |cells: &Vec<Cell>| cells.iter().position(|c| *c != Cell::Empty);
+    let left = sheet.rows.values().filter_map(blank).min().unwrap_or(0);
+    let row = |(place, mut cells): (u64, Vec<Cell>)| {
+        cells.drain(..left.min(cells.len()));
+        Row::new(place, cells)
+    };
+    Ok((sheet.rows.into_iter().map(row).collect(), formulas))
 }
 
 /// A sheet while its cells come.
 struct Sheet {
-    rows: Vec<Row>,
+    /// By their places, from 1.
+    rows: BTreeMap<u64, Vec<Cell>>,
     cells: usize,
     /// Bytes of the file.
     size: usize,
@@ -154,30 +145,14 @@ impl Sheet {
         if cell == Cell::Empty {
             return Ok(());
         }
-        let (place, column) = (u64::from(row) + 1, column as usize);
-        let at = match self.rows.last() {
-            Some(last) if last.place == place => self.rows.len() - 1,
-            Some(last) if last.place > place => match self.rows.binary_search_by_key(&place, |r| r.place) {
-                Ok(at) => at,
-                Err(at) => {
-                    self.rows.insert(at, Row::new(place, Vec::new()));
-                    at
-                }
-            },
-            _ => {
-                self.rows.push(Row::new(place, Vec::new()));
-                self.rows.len() - 1
-            }
-        };
-        let cells = &mut self.rows[at].cells;
-        self.cells += (column + 1).saturating_sub(cells.len());
+        let cells = self.rows.entry(u64::from(row) + 1).or_default();
+        let wide = cells.len().max(column as usize + 1);
+        self.cells += wide - cells.len();
         if self.cells > super::most_cells(self.size) / 4 {
             return Err(super::too_many("the sheet", self.cells, self.size));
         }
-        if cells.len() <= column {
-            cells.resize(column + 1, Cell::Empty);
-        }
-        cells[column] = cell;
+        cells.resize(wide, Cell::Empty);
+        cells[column as usize] = cell;
         Ok(())
     }
 }

@@ -1,9 +1,11 @@
 //! What an import writes: the table, the rig.toml with what was assumed, and the log.
 
+use super::grid::csv_of;
 use super::map::Map;
-use miette::IntoDiagnostic;
+use super::values::{middle, sorted};
+use miette::{IntoDiagnostic, WrapErr};
 use models::covariate::{self, Covariate};
-use models::pass::Pass;
+use models::pass::{Pass, read_passes, write_passes};
 use models::quantity::PeakToPeak;
 use runs::fingertip::{Fingertip, FingertipSetup};
 use std::collections::BTreeMap;
@@ -21,43 +23,38 @@ pub fn columns(map: &Map, series: bool) -> Vec<&'static str> {
     std::iter::once("point").chain(columns).collect()
 }
 
-/// The point table, numbers with as many digits as it takes to read them back unchanged.
+/// The point table with these columns, numbers with as many digits as it takes to read them back unchanged.
+fn table(passes: &[Pass], columns: &[&str]) -> miette::Result<String> {
+    let mut whole = Vec::new();
+    write_passes(passes, &mut whole).into_diagnostic()?;
+    let mut reader = csv::Reader::from_reader(&whole[..]);
+    let header = reader.headers().into_diagnostic()?.clone();
+    let places: Vec<usize> = (0..header.len()).filter(|k| columns.contains(&&header[*k])).collect();
+    let rows = reader.records().collect::<Result<Vec<_>, _>>().into_diagnostic()?;
+    csv_of(columns, rows.iter().map(|row| places.iter().map(|k| &row[*k])))
+}
+
+/// The table as CSV. What is written must be what was meant: it is read back as a diagnosis would.
 ///
 /// # Errors
-/// Whatever the writer says.
-pub fn table(passes: &[Pass], columns: &[&'static str]) -> miette::Result<String> {
-    let mut writer = csv::Writer::from_writer(Vec::new());
-    writer.write_record(columns).into_diagnostic()?;
-    for p in passes {
-        let condition = p.condition(1.0);
-        let cell = |name: &&str| -> String {
-            let number = |v: Option<f64>| v.map(|v| v.to_string()).unwrap_or_default();
-            let count = |v: Option<u64>| v.map(|v| v.to_string()).unwrap_or_default();
-            match *name {
-                "point" => p.point.to_string(),
-                "lateral_force_n" => number(p.lateral_force_n),
-                "normal_force_sd_n" => number(p.normal_force_sd_n),
-                "lateral_force_sd_n" => number(p.lateral_force_sd_n),
-                "samples" => count(p.samples),
-                "phase_shift_deg" => number(p.phase_shift_deg),
-                "replicate" => count(p.replicate),
-                "run" => p.run.clone().unwrap_or_default(),
-                "session" => count(p.session),
-                name => match covariate::by_name(name).and_then(|c| c.of(&condition)) {
-                    // Micrometres in metres are mostly zeros.
-                    Some(v) if name == covariate::AMPLITUDE.name => format!("{v:e}"),
-                    value => number(value),
-                },
-            }
-        };
-        writer.write_record(columns.iter().map(cell)).into_diagnostic()?;
+/// A table that reads back as another one.
+pub fn written(passes: &[Pass], columns: &[&str], states_frequency: bool) -> miette::Result<String> {
+    let table = table(passes, columns)?;
+    let mut back = read_passes(table.as_bytes()).into_diagnostic().wrap_err("the table that was made")?;
+    if !states_frequency {
+        back.iter_mut().zip(passes).for_each(|(b, p)| b.frequency_hz = p.frequency_hz);
     }
-    String::from_utf8(writer.into_inner().into_diagnostic()?).into_diagnostic()
+    if back != passes {
+        miette::bail!(
+            "the table that was made does not read back as it was written: please report this file"
+        );
+    }
+    Ok(table)
 }
 
 /// Relative standard deviation from pass to pass, from neighbours in time of one setting: a bad pass and a
 /// slow drift hardly count. `None` with fewer than eight such pairs.
-pub fn repeatability(passes: &[Pass]) -> Option<(f64, usize)> {
+fn repeatability(passes: &[Pass]) -> Option<(f64, usize)> {
     let mut settings: BTreeMap<Vec<i64>, Vec<&Pass>> = BTreeMap::new();
     for p in passes.iter().filter(|p| p.lateral_force_n.is_some()) {
         let condition = p.condition(1.0);
@@ -71,9 +68,9 @@ pub fn repeatability(passes: &[Pass]) -> Option<(f64, usize)> {
         let step = |w: &[&Pass]| ((ratio(w[1]) - ratio(w[0])) / (0.5 * (ratio(w[1]) + ratio(w[0])))).abs();
         steps.extend(group.windows(2).filter(|w| w[0].run == w[1].run).map(step).filter(|s| s.is_finite()));
     }
-    steps.sort_by(f64::total_cmp);
+    let steps = sorted(steps.into_iter());
     // The median of a difference of two normal values is 0.6745 times root two of their deviation.
-    let sd = steps.get(steps.len() / 2)? / (0.674_489_75 * std::f64::consts::SQRT_2);
+    let sd = middle(&steps)? / (0.674_489_75 * std::f64::consts::SQRT_2);
     (steps.len() >= 8).then_some((sd, steps.len()))
 }
 
@@ -111,11 +108,7 @@ pub fn rig(passes: &[Pass], source: &str, tip: Option<&str>) -> miette::Result<(
             (finger, format!("ASSUMED {from}"))
         }
     };
-    let load = {
-        let mut loads: Vec<f64> = passes.iter().map(|p| p.normal_force_n).collect();
-        loads.sort_by(f64::total_cmp);
-        loads.get(loads.len() / 2).copied().unwrap_or(0.25)
-    };
+    let load = middle(&sorted(passes.iter().map(|p| p.normal_force_n))).unwrap_or(0.25);
     let (sd, how) = match repeatability(passes) {
         Some((sd, pairs)) => {
             let sd = sd.clamp(REPEATABILITY[0], REPEATABILITY[1]);

@@ -2,7 +2,7 @@
 
 use super::schema::Kind;
 use crate::import::targets::{ColumnKind as Cell, TARGETS};
-use serde_json::{Map, Value};
+use serde_json::Value;
 use std::fmt::Write;
 
 /// The page.
@@ -18,8 +18,8 @@ pub fn page() -> String {
         for (name, object) in objects(&schema) {
             if !name.is_empty() {
                 let _ = write!(page, "\n### {} `{name}`\n", kind.name());
-                if let Some(text) = object.get("description").and_then(Value::as_str) {
-                    let _ = write!(page, "\n{}\n", one_line(text));
+                if object["description"].is_string() {
+                    let _ = write!(page, "\n{}\n", about(&object));
                 }
             }
             page.push_str("\n| key | type | default | meaning |\n|---|---|---|---|\n");
@@ -37,21 +37,20 @@ pub fn page() -> String {
 pub fn objects(schema: &Value) -> Vec<(String, Value)> {
     let mut all = Vec::new();
     push(&mut all, String::new(), schema);
-    for (name, definition) in schema.get("$defs").and_then(Value::as_object).into_iter().flatten() {
+    for (name, definition) in schema["$defs"].as_object().into_iter().flatten() {
         push(&mut all, name.clone(), definition);
     }
     all
 }
 
 fn push(all: &mut Vec<(String, Value)>, name: String, schema: &Value) {
-    if schema.get("properties").is_some() {
+    if schema["properties"].is_object() {
         all.push((name.clone(), schema.clone()));
     }
     for list in ["oneOf", "anyOf", "allOf"] {
-        for (k, variant) in schema.get(list).and_then(Value::as_array).into_iter().flatten().enumerate() {
-            if variant.get("properties").is_some() {
-                push(all, format!("{name}.{}", tag(variant).unwrap_or_else(|| (k + 1).to_string())), variant);
-            }
+        let variants = schema[list].as_array().into_iter().flatten().enumerate();
+        for (k, variant) in variants.filter(|(_, variant)| variant["properties"].is_object()) {
+            push(all, format!("{name}.{}", tag(variant).unwrap_or_else(|| (k + 1).to_string())), variant);
         }
     }
 }
@@ -60,52 +59,44 @@ fn push(all: &mut Vec<(String, Value)>, name: String, schema: &Value) {
 /// than one way. The tables' types link to them.
 fn choices(page: &mut String, kind: Kind, schema: &Value) {
     let tables: Vec<String> = objects(schema).into_iter().map(|(name, _)| name).collect();
-    let definitions = schema.get("$defs").and_then(Value::as_object);
-    for (name, definition) in definitions.into_iter().flatten().filter(|(name, _)| !tables.contains(name)) {
-        let words =
-            |of: &Value| of.get("description").and_then(Value::as_str).map(one_line).unwrap_or_default();
-        let _ = write!(page, "\n### {} `{name}`\n\n{}\n\n", kind.name(), words(definition));
-        let variants = definition.get("oneOf").or(definition.get("anyOf")).and_then(Value::as_array);
-        match variants {
-            None => {
-                let _ = writeln!(page, "{}", type_of(kind, definition));
-            }
-            Some(variants) => {
-                page.push_str("| one of | meaning |\n|---|---|\n");
-                for variant in variants {
-                    let title = tag(variant).map_or_else(|| type_of(kind, variant), |tag| format!("`{tag}`"));
-                    let _ = writeln!(page, "| {title} | {} |", words(variant));
-                }
-            }
+    let definitions = schema["$defs"].as_object().into_iter().flatten();
+    for (name, definition) in definitions.filter(|(name, _)| !tables.contains(name)) {
+        let _ = write!(page, "\n### {} `{name}`\n\n{}\n\n", kind.name(), about(definition));
+        let Some(variants) = definition["oneOf"].as_array().or(definition["anyOf"].as_array()) else {
+            let _ = writeln!(page, "{}", type_of(kind, definition));
+            continue;
+        };
+        page.push_str("| one of | meaning |\n|---|---|\n");
+        for variant in variants {
+            let title = tag(variant).map_or_else(|| type_of(kind, variant), |tag| format!("`{tag}`"));
+            let _ = writeln!(page, "| {title} | {} |", about(variant));
         }
     }
 }
 
 /// What tells a variant from the others: a property of one value, or its only key.
 fn tag(variant: &Value) -> Option<String> {
-    let properties = variant.get("properties")?.as_object()?;
-    let constant = properties.values().find_map(|p| Some(p.get("const")?.as_str()?.to_string()));
+    let properties = variant["properties"].as_object()?;
+    let constant = properties.values().find_map(|p| Some(p["const"].as_str()?.to_string()));
     constant.or_else(|| properties.keys().next().cloned())
 }
 
 fn rows(page: &mut String, kind: Kind, object: &Value) {
-    let needed: Vec<&str> = object
-        .get("required")
-        .and_then(Value::as_array)
-        .into_iter()
-        .flatten()
-        .filter_map(Value::as_str)
-        .collect();
-    for (key, property) in object.get("properties").and_then(Value::as_object).into_iter().flatten() {
-        let default = match property.get("default") {
-            _ if needed.contains(&key.as_str()) => "needed".to_string(),
-            None | Some(Value::Null) => String::new(),
-            Some(Value::Object(_)) => "its own".into(),
-            Some(default) => format!("`{}`", default.to_string().replace('|', "\\|")),
+    let needed = |key: &str| object["required"].as_array().is_some_and(|all| all.iter().any(|k| k == key));
+    for (key, property) in object["properties"].as_object().into_iter().flatten() {
+        let default = match &property["default"] {
+            _ if needed(key) => "needed".to_string(),
+            Value::Null => String::new(),
+            Value::Object(_) => "its own".into(),
+            default => format!("`{}`", default.to_string().replace('|', "\\|")),
         };
-        let text = property.get("description").and_then(Value::as_str).map(one_line).unwrap_or_default();
-        let _ = writeln!(page, "| `{key}` | {} | {default} | {text} |", type_of(kind, property));
+        let _ = writeln!(page, "| `{key}` | {} | {default} | {} |", type_of(kind, property), about(property));
     }
+}
+
+/// The description of a key or a definition.
+fn about(of: &Value) -> String {
+    of["description"].as_str().map(one_line).unwrap_or_default()
 }
 
 fn one_line(text: &str) -> String {
@@ -114,51 +105,44 @@ fn one_line(text: &str) -> String {
 
 /// A type in words; a definition as a link to its table.
 fn type_of(kind: Kind, schema: &Value) -> String {
-    let Some(object) = schema.as_object() else { return "anything".into() };
-    if let Some(name) = object.get("$ref").and_then(Value::as_str).and_then(|r| r.rsplit('/').next()) {
+    if let Some(name) = schema["$ref"].as_str().and_then(|r| r.rsplit('/').next()) {
         return format!("[{name}](#{}-{})", kind.name(), name.to_lowercase());
     }
-    if let Some(value) = object.get("const") {
+    if let Some(value) = schema.get("const") {
         return format!("`{value}`");
     }
-    if let Some(values) = object.get("enum").and_then(Value::as_array) {
-        return values
-            .iter()
-            .filter(|v| !v.is_null())
-            .map(|v| format!("`{v}`"))
-            .collect::<Vec<_>>()
-            .join(", ");
+    if let Some(values) = schema["enum"].as_array() {
+        let values = values.iter().filter(|v| !v.is_null()).map(|v| format!("`{v}`"));
+        return values.collect::<Vec<_>>().join(", ");
     }
-    for list in ["anyOf", "oneOf", "allOf"] {
-        if let Some(variants) = object.get(list).and_then(Value::as_array) {
-            let is_null = |v: &&Value| v.get("type").and_then(Value::as_str) != Some("null");
-            let mut words: Vec<String> = variants.iter().filter(is_null).map(|v| type_of(kind, v)).collect();
-            words.dedup();
-            return words.join(" or ");
-        }
+    if let Some(variants) = ["anyOf", "oneOf", "allOf"].iter().find_map(|list| schema[*list].as_array()) {
+        let variants = variants.iter().filter(|v| v["type"] != "null");
+        let mut words: Vec<String> = variants.map(|v| type_of(kind, v)).collect();
+        words.dedup();
+        return words.join(" or ");
     }
-    match object.get("type") {
-        Some(Value::String(name)) => named(kind, name, object),
-        Some(Value::Array(names)) => {
+    match &schema["type"] {
+        Value::String(name) => named(kind, name, schema),
+        Value::Array(names) => {
             let names = names.iter().filter_map(Value::as_str).filter(|n| *n != "null");
-            names.map(|n| named(kind, n, object)).collect::<Vec<_>>().join(" or ")
+            names.map(|n| named(kind, n, schema)).collect::<Vec<_>>().join(" or ")
         }
         _ => "anything".into(),
     }
 }
 
-fn named(kind: Kind, name: &str, object: &Map<String, Value>) -> String {
+fn named(kind: Kind, name: &str, schema: &Value) -> String {
     match name {
-        "array" => match (object.get("items"), object.get("maxItems"), object.get("prefixItems")) {
+        "array" => match (schema.get("items"), schema.get("maxItems"), schema["prefixItems"].as_array()) {
             (Some(items), Some(count), _) => format!("list of {count}: {}", type_of(kind, items)),
             (Some(items), None, _) => format!("list of {}", type_of(kind, items)),
-            (None, _, Some(Value::Array(items))) => {
+            (None, _, Some(items)) => {
                 format!("list of {}", items.iter().map(|i| type_of(kind, i)).collect::<Vec<_>>().join(", "))
             }
             _ => "list".into(),
         },
-        "object" => match object.get("additionalProperties") {
-            Some(of) if of.is_object() => format!("table of {}", type_of(kind, of)),
+        "object" => match &schema["additionalProperties"] {
+            of @ Value::Object(_) => format!("table of {}", type_of(kind, of)),
             _ => "table".into(),
         },
         other => other.into(),
@@ -200,7 +184,7 @@ fn targets() -> String {
             t.name,
             t.column,
             t.words,
-            t.headers().join(", ")
+            t.headers.join(", ")
         );
     }
     page

@@ -127,10 +127,7 @@ fn table() -> Value {
             Cell::Count | Cell::Way => "integer",
             Cell::Number(_) => "number",
         };
-        let unit = match target.kind {
-            Cell::Number(dimension) => format!(", in {}", dimension.si()),
-            _ => String::new(),
-        };
+        let unit = target.dimension().map_or(String::new(), |dimension| format!(", in {}", dimension.si()));
         let needed = covariate.map_or(String::new(), |c| format!(": {}", c.needed));
         let mut property = json!({ "type": kind, "description": format!("{}{unit}{needed}.", target.words) });
         if let Some(c) = covariate {

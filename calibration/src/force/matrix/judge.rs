@@ -1,9 +1,10 @@
 //! What makes a series unfit for a certificate.
 
-use super::{ForceError, ForceFit, Linearity, Options, Term, range};
+use super::{ForceError, ForceFit, Linearity, Options, Term};
 use crate::force::series::LoadReading;
 use crate::force::{AXES, Axis};
-use crate::uncertainty::student::f_test_p_value;
+use crate::regression::ends;
+use crate::uncertainty::student;
 
 /// Before the fit: saturation, too few loads or zeros.
 pub(super) fn refuse_unfit(readings: &[LoadReading], options: &Options) -> Result<(), ForceError> {
@@ -78,7 +79,7 @@ pub(super) fn judge(
             return Err(ForceError::AxisBlind { axis, own: gain(axis, axis), other });
         }
     }
-    let [start, end] = range(readings.iter().map(|r| r.time_s));
+    let [start, end] = ends(readings.iter().map(|r| r.time_s));
     let mut worst = None;
     for axis in AXES {
         let p = lack_of_fit(fit, readings, axis);
@@ -93,8 +94,8 @@ pub(super) fn judge(
             (Some(a), Some(b)) => Some(f64::min(a, b)),
             (a, b) => a.or(b),
         };
-        let span = range(readings.iter().map(|r| r.counts[axis as usize]));
-        let span = span[1] - span[0];
+        let [low, high] = ends(readings.iter().map(|r| r.counts[axis as usize]));
+        let span = high - low;
         let drift = fit.value(axis, Term::Drift) * (end - start);
         if drift.abs() > options.zero_drift_limit * span {
             return Err(ForceError::DriftingZero {
@@ -130,16 +131,8 @@ fn lack_of_fit(fit: &ForceFit, readings: &[LoadReading], channel: Axis) -> Optio
             None => groups.push((i, vec![residual])),
         }
     }
-    let (mut between, mut within) = (0.0, 0.0);
-    for (_, members) in &groups {
-        let mean = members.iter().sum::<f64>() / members.len() as f64;
-        between += members.len() as f64 * mean * mean;
-        within += members.iter().map(|r| (r - mean).powi(2)).sum::<f64>();
-    }
-    let within_dof = (readings.len() - groups.len()) as f64;
-    let between_dof = groups.len() as f64 - fit.terms.len() as f64;
-    (within_dof >= 3.0 && between_dof >= 1.0)
-        .then(|| f_test_p_value((between / between_dof) / (within / within_dof), between_dof, within_dof))
+    let groups: Vec<Vec<f64>> = groups.into_iter().map(|(_, members)| members).collect();
+    student::lack_of_fit(&groups, fit.terms.len())
 }
 
 /// Correlation of the residuals of neighbouring readings in time.

@@ -61,17 +61,11 @@ fn tell(rows: &[Answers], seed: u64, sets: usize, partial: bool, json: bool) {
     );
     out!("|---|---|---|---|---|---|---|---|---|---|");
     for a in rows {
+        let Answers { noise, truth, sets, right, wrong, ambiguous, unknown, missed, .. } = a;
         let (found, others) = (format!("{}/{}", a.found, a.bad), format!("{}/{}", a.falsely, a.good));
         out!(
-            "| {} | {} | {} | {} | {} | {} | {} | {} | {found} | {others} |",
-            a.noise,
-            a.truth,
-            a.sets,
-            a.right,
-            a.wrong,
-            a.ambiguous,
-            a.unknown,
-            a.missed
+            "| {noise} | {truth} | {sets} | {right} | {wrong} | \
+             {ambiguous} | {unknown} | {missed} | {found} | {others} |"
         );
     }
 }

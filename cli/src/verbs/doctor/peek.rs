@@ -65,10 +65,7 @@ fn range(text: &str) -> Result<(u16, u16), String> {
     Ok((first, count))
 }
 
-/// Shows what is there.
-///
-/// # Errors
-/// Nobody answers, or the answer is no good.
+/// Shows what is there; fails where nobody answers, or the answer is no good.
 pub fn run(args: &Args, json: bool) -> miette::Result<ExitCode> {
     let place = Place::of(&args.address);
     let speed = Speed { baud: args.baud, format: args.format.clone(), bitrate: args.bitrate };

@@ -1,14 +1,11 @@
 //! `muprime model adapt`: a surrogate over up to ten variables whose nodes are chosen in rounds, each round a study that is submitted.
 
 use crate::verbs::cases::{spans, values};
+use crate::verbs::prelude::*;
 use clap::Args;
 use models::ridge::Steady;
-use runs::print::answer_json;
-use runs::{out, say};
-use serde_json::{Value, json};
+use serde_json::Value;
 use std::collections::BTreeMap;
-use std::path::{Path, PathBuf};
-use std::process::ExitCode;
 use studies::cases::adaptive::{SparseGrid, place_of};
 use studies::cases::file::Header;
 use studies::cases::kinds::{Cell, ridge};
@@ -70,10 +67,8 @@ fn run_study(
     Ok(whole(&args.out, name, header, lines, &args.rounds)?.into_iter().map(mu).collect())
 }
 
-/// Grows the surrogate round by round.
-///
-/// # Errors
-/// Bad variables, a folder of another surrogate, an engine that takes nothing.
+/// Grows the surrogate round by round; refused: bad variables, a folder of another surrogate, an engine that
+/// takes nothing.
 pub fn run(args: &AdaptArgs, json: bool) -> miette::Result<ExitCode> {
     if args.rounds.detach {
         miette::bail!("--detach: a round follows from the results of the one before it");
@@ -132,12 +127,10 @@ pub fn run(args: &AdaptArgs, json: bool) -> miette::Result<ExitCode> {
         "variables": spans, "set": base, "elements": args.elements, "rounds": rounds, "grid": grid,
     });
     runs::files::write_whole(&surrogate, document.to_string())?;
-    if json {
-        answer_json(
-            &json!({ "file": surrogate, "nodes": grid.nodes.len(), "rms": rms, "wanted": args.wanted, "rounds": rounds }),
-        );
-    } else {
-        out!("{}: {} nodes, rms {rms:.4} of {} wanted", surrogate.display(), grid.nodes.len(), args.wanted);
-    }
+    let (nodes, wanted) = (grid.nodes.len(), args.wanted);
+    let document =
+        json!({ "file": surrogate, "nodes": nodes, "rms": rms, "wanted": wanted, "rounds": rounds });
+    let words = format!("{}: {nodes} nodes, rms {rms:.4} of {wanted} wanted", surrogate.display());
+    answered(json, &document, words)?;
     Ok(ExitCode::from(u8::from(rms > args.wanted)))
 }

@@ -2,16 +2,12 @@
 
 use super::conditions::ConditionArgs;
 use super::refused;
+use crate::verbs::prelude::*;
 use clap::Args;
-use miette::IntoDiagnostic;
 use models::inverse;
 use models::quantity::PeakToPeak;
 use models::surrogate::Surrogate;
-use runs::print::answer_json;
 use runs::report::human::{number, quantity, to_its_uncertainty};
-use runs::{out, say};
-use serde_json::json;
-use std::process::ExitCode;
 
 /// Arguments of `muprime model amplitude-for`. The amplitude flag is the largest that may be used.
 #[derive(Args)]

@@ -57,24 +57,19 @@ impl ContactArgs {
     }
 }
 
-/// What a flag may be on any rig that vibrates a plate under a finger. The models answer for other values
-/// too, and mean nothing.
-const RANGES: [(&str, [f64; 2]); 5] = [
-    ("amplitude_pp_m", [0.0, 1e-4]),
-    ("frequency_hz", [HARD.frequency_hz.0, HARD.frequency_hz.1]),
-    ("speed_m_s", [0.0, 10.0]),
-    ("normal_force_n", [0.0, 1000.0]),
-    ("mu0", [0.0, 10.0]),
-];
-
 impl ConditionArgs {
-    /// The first value that no rig can have; what no model is defined for is refused by the model itself.
-    ///
-    /// # Errors
-    /// The flag, its value, what is allowed, and the unit that was probably meant.
+    /// The first value that no rig can have; what no model is defined for is refused by the model itself. The
+    /// words are the flag, its value, what is allowed, and the unit that was probably meant.
     pub fn check(&self) -> Result<(), String> {
-        let values = [self.amplitude_pp_m, self.frequency_hz, self.speed_m_s, self.normal_force_n, self.mu0];
-        for ((key, [least, largest]), value) in RANGES.into_iter().zip(values) {
+        // Of any rig that vibrates a plate under a finger. The models answer for other values too, and mean
+        // nothing.
+        for (key, value, [least, largest]) in [
+            ("amplitude_pp_m", self.amplitude_pp_m, [0.0, 1e-4]),
+            ("frequency_hz", self.frequency_hz, [HARD.frequency_hz.0, HARD.frequency_hz.1]),
+            ("speed_m_s", self.speed_m_s, [0.0, 10.0]),
+            ("normal_force_n", self.normal_force_n, [0.0, 1000.0]),
+            ("mu0", self.mu0, [0.0, 10.0]),
+        ] {
             if value > largest || value > 0.0 && value < least {
                 let meant = unit_meant(key, value, [least.max(1e-6 * largest), largest]);
                 let hint = meant.map_or_else(String::new, |meant| format!(" ({meant})"));

@@ -1,12 +1,9 @@
 //! `muprime model effects`: the library of candidate effects.
 
+use crate::verbs::prelude::*;
 use clap::Args;
 use effects::effect::Prior;
-use miette::IntoDiagnostic;
-use runs::out;
-use runs::print::answer_json;
 use runs::report::human::number;
-use std::process::ExitCode;
 
 #[derive(Args)]
 pub struct EffectsArgs {
@@ -15,9 +12,6 @@ pub struct EffectsArgs {
 }
 
 /// Lists place, parameters with unit, zero, prior and bounds, source and needed covariates of every effect.
-///
-/// # Errors
-/// Only if the listing cannot be written as JSON.
 pub fn run(args: &EffectsArgs, json: bool) -> miette::Result<ExitCode> {
     let mut entries = effects::library().to_vec();
     if let Some(name) = &args.name {

@@ -1,15 +1,12 @@
 //! `muprime model patch`: what one ridge in plane strain leaves out, as Psi* of a part of Fig. 12.
 
 use super::refused;
+use crate::verbs::prelude::*;
 use clap::Args;
 use models::psi_fit::PsiFit;
 use models::reading::Reading;
 use models::ridge::patch::{Patch, plane_stress};
 use models::ridge::{RidgeCase, RidgeError, RunSettings, run as run_ridge, short_study};
-use runs::out;
-use runs::print::answer_json;
-use serde_json::json;
-use std::process::ExitCode;
 
 /// Arguments of `muprime model patch`.
 #[derive(Args)]
@@ -43,9 +40,6 @@ fn rows(args: &PatchArgs) -> Result<Vec<(&'static str, Option<PsiFit>)>, RidgeEr
 }
 
 /// Runs the comparison; refuses bad input.
-///
-/// # Errors
-/// An answer that cannot be written.
 pub fn run(args: &PatchArgs, json: bool) -> miette::Result<ExitCode> {
     let rows = rows(args).map_err(refused)?;
     if json {

@@ -2,9 +2,10 @@
 
 use super::conditions::ConditionArgs;
 use super::refused;
+use crate::verbs::prelude::*;
 use clap::Args;
 use clap::builder::{PossibleValuesParser, TypedValueParser};
-use miette::IntoDiagnostic;
+use models::condition::Condition;
 use models::finger::Finger;
 use models::law::BuiltIn;
 use models::prediction::EmpiricalPsi;
@@ -12,11 +13,8 @@ use models::psi::{PsiEq16, PsiEq17};
 use models::reading::Reading;
 use models::spring_slider;
 use models::surrogate::Surrogate;
-use runs::out;
-use runs::print::answer_json;
 use runs::report::human::quantity;
 use serde::Serialize;
-use std::process::ExitCode;
 
 /// Reads a law's name on the command line.
 fn law() -> impl TypedValueParser<Value = BuiltIn> {
@@ -116,14 +114,9 @@ pub fn run(args: &PointArgs, json: bool) -> miette::Result<ExitCode> {
         validity: prediction.validity,
     };
     if args.model == BuiltIn::Surrogate {
-        let c = &condition;
-        let at = Surrogate::shipped().into_diagnostic()?.at(
-            c.amplitude,
-            c.frequency_hz,
-            c.speed_m_s / c.mu0,
-            c.normal_force_n,
-            args.young_modulus_pa,
-        );
+        let Condition { amplitude, frequency_hz, speed_m_s, normal_force_n, mu0, .. } = condition;
+        let (surrogate, modulus_pa) = (Surrogate::shipped().into_diagnostic()?, args.young_modulus_pa);
+        let at = surrogate.at(amplitude, frequency_hz, speed_m_s / mu0, normal_force_n, modulus_pa);
         answer.contact_fraction = at.contact_fraction;
         answer.phase_shift_deg = at.phase_shift_deg.rem_euclid(360.0);
         answer.touch_down_deg = None;
@@ -131,29 +124,22 @@ pub fn run(args: &PointArgs, json: bool) -> miette::Result<ExitCode> {
     if json {
         answer_json(&answer);
     } else {
-        // A law without an error of its own says nothing of how far off it is: no uncertainty is not an uncertainty of zero.
+        // A law without an error of its own says nothing of how far off it is: no uncertainty is not one of zero.
         let sd = match answer.mu_relative_sd {
             sd if sd > 0.0 => format!(" \u{b1} {sd:.3}"),
             _ => String::new(),
         };
+        let Answer { model, mu_relative, phase_shift_deg, .. } = &answer;
+        let (force, contact) = (quantity(answer.lateral_force_n, "N"), 100.0 * answer.contact_fraction);
         out!(
-            "{}: mu' = {:.3}{sd}, lateral force {}, contact {:.0} % of the time, phase shift {:.0} deg",
-            answer.model,
-            answer.mu_relative,
-            quantity(answer.lateral_force_n, "N"),
-            100.0 * answer.contact_fraction,
-            answer.phase_shift_deg
+            "{model}: mu' = {mu_relative:.3}{sd}, lateral force {force}, contact {contact:.0} % of the time, \
+             phase shift {phase_shift_deg:.0} deg"
         );
         if answer.validity == models::prediction::Validity::Extrapolated {
             out!("  outside the range that the law was made for: an extrapolation");
         }
-        for read in &answer.readings {
-            out!(
-                "  where {}: mu' = {:.3} \u{b1} {:.3}",
-                read.reading.words(),
-                read.mu_relative,
-                read.mu_relative_sd
-            );
+        for Read { reading, mu_relative, mu_relative_sd, .. } in &answer.readings {
+            out!("  where {}: mu' = {mu_relative:.3} \u{b1} {mu_relative_sd:.3}", reading.words());
         }
     }
     Ok(ExitCode::SUCCESS)

@@ -2,14 +2,10 @@
 
 use super::conditions::ContactArgs;
 use super::refused;
+use crate::verbs::prelude::*;
 use clap::{Args, ValueEnum};
-use miette::{IntoDiagnostic, WrapErr};
 use models::ridge::study::{FIG_9_AMPLITUDES_PP_M, FINE_AMPLITUDES_PP_M, content_key};
 use models::ridge::{RidgeCase, case};
-use runs::out;
-use serde_json::json;
-use std::path::{Path, PathBuf};
-use std::process::ExitCode;
 use studies::figures::reading::{self, Reading};
 use studies::figures::{self, Study, paper, store};
 

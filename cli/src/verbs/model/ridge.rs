@@ -4,18 +4,15 @@ mod start;
 
 use super::conditions::{ConditionArgs, ContactArgs};
 use super::refused;
+use crate::verbs::prelude::*;
 use clap::{Args, ValueEnum};
 use models::reading::Reading;
 use models::ridge::{
     self, FrictionRule, RidgeCase, RidgeError, RidgeProfile, RidgeRun, RunSettings, Strain, case,
 };
-use runs::print::answer_json;
 use runs::report::human::{number, quantity};
-use runs::{out, say};
 use serde::Serialize;
-use serde_json::json;
 use start::OtherStart;
-use std::process::ExitCode;
 use std::time::Instant;
 use studies::progress::Study;
 
@@ -151,8 +148,7 @@ pub fn run(args: &RidgeArgs, json: bool) -> miette::Result<ExitCode> {
         }
         Err(why) => return Err(refused(why)),
     };
-    let updates = run.elements as f64 * run.steps as f64;
-    let element_updates_per_second = updates / wall_seconds;
+    let element_updates_per_second = run.elements as f64 * run.steps as f64 / wall_seconds;
     let from_above = other.as_ref();
     let answer = Answer { run: &run, wall_seconds, element_updates_per_second, case: &case, from_above };
     if json {
@@ -164,18 +160,14 @@ pub fn run(args: &RidgeArgs, json: bool) -> miette::Result<ExitCode> {
         models::psi::relative_friction(psi, reading.psi_star().0)
     };
     let [stroke, sine] = Reading::ALL.map(law);
+    let (mu, sd) = (run.mu_relative, run.mu_relative_sd);
     out!(
-        "mu' = {:.3} \u{b1} {:.3}   (Eq. 20: {stroke:.3} if the paper's w is peak-to-peak, {sine:.3} if it is the sine's amplitude)",
-        run.mu_relative,
-        run.mu_relative_sd,
+        "mu' = {mu:.3} \u{b1} {sd:.3}   (Eq. 20: {stroke:.3} if the paper's w is peak-to-peak, {sine:.3} if it is the sine's amplitude)"
     );
-    out!(
-        "lateral force {}, mean reaction {} for {} applied, greatest {}",
-        quantity(run.lateral_force_n, "N"),
-        quantity(run.mean_reaction_force_n, "N"),
-        quantity(case.normal_force_n, "N"),
-        quantity(run.peak_reaction_force_n, "N")
-    );
+    let forces_n =
+        [run.lateral_force_n, run.mean_reaction_force_n, case.normal_force_n, run.peak_reaction_force_n];
+    let [lateral, mean, applied, greatest] = forces_n.map(|force| quantity(force, "N"));
+    out!("lateral force {lateral}, mean reaction {mean} for {applied} applied, greatest {greatest}");
     out!(
         "contact {:.0} % of the time, phase shift {}, {}{}",
         100.0 * run.contact_fraction,
@@ -183,22 +175,18 @@ pub fn run(args: &RidgeArgs, json: bool) -> miette::Result<ExitCode> {
         if run.steady { "steady" } else { "NOT steady" },
         if run.period_doubled { ", period doubled" } else { "" }
     );
+    let RidgeRun { elements, cycles, averaged_cycles, steps, step_s, .. } = run;
     out!(
-        "{} elements, {} cycles ({} averaged), {} steps of {:.2e} s, {:.2} s, {:.0} million element updates/s",
-        run.elements,
-        run.cycles,
-        run.averaged_cycles,
-        run.steps,
-        run.step_s,
-        wall_seconds,
-        answer.element_updates_per_second / 1e6
+        "{elements} elements, {cycles} cycles ({averaged_cycles} averaged), {steps} steps of {step_s:.2e} s, \
+         {wall_seconds:.2} s, {:.0} million element updates/s",
+        element_updates_per_second / 1e6
     );
     if let Some(other) = &other {
         out!("{}", other.words(&run));
     } else if start::is_lightly_damped(&case) {
+        let below = number(start::LIGHTLY_DAMPED_PER_S);
         out!(
-            "lightly damped: below {} /s the answer may depend on how the run began; try --both-starts",
-            number(start::LIGHTLY_DAMPED_PER_S)
+            "lightly damped: below {below} /s the answer may depend on how the run began; try --both-starts"
         );
     }
     Ok(ExitCode::SUCCESS)

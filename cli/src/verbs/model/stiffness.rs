@@ -2,15 +2,13 @@
 
 use super::conditions::ContactArgs;
 use super::refused;
+use crate::verbs::prelude::*;
 use clap::Args;
 use models::reading::Reading;
 use models::ridge::short_study;
 use models::ridge::static_stiffness::{HeldAt, StaticStiffness, of_case};
 use models::ridge::{FrictionRule, RidgeCase, RidgeError, RidgeGeometry, RidgeProfile, Strain, case};
-use runs::out;
-use runs::print::answer_json;
 use serde::Serialize;
-use std::process::ExitCode;
 
 /// Arguments of `muprime model stiffness`.
 #[derive(Args)]
@@ -50,55 +48,50 @@ impl StiffnessArgs {
 const LOADS: [f64; 3] = [1.0, 3.0, 10.0];
 
 /// What a line is about, and the case.
-struct Row {
-    what: String,
-    case: RidgeCase,
-}
+type Row = (&'static str, RidgeCase);
 
 /// What is varied in the table: shape, moduli, thickness, Poisson's ratio, contact.
 fn table(base: RidgeCase) -> Vec<Row> {
-    let row = |what: &str, case: RidgeCase| Row { what: what.into(), case };
     let shaped = |geometry| RidgeCase { geometry, ..base };
     let profile = |profile| shaped(RidgeGeometry { profile, ..base.geometry });
     let corneum = |inner_corneum_m| shaped(RidgeGeometry { inner_corneum_m, ..base.geometry });
     let ridge = |ridge_height_m| shaped(RidgeGeometry { ridge_height_m, ..base.geometry });
     vec![
-        row("as given", base),
-        row("ellipse", profile(RidgeProfile::Ellipse)),
-        row("flat slab", profile(RidgeProfile::Flat)),
-        row("ridge 50 \u{b5}m high", ridge(50e-6)),
-        row("inner corneum 30 \u{b5}m", corneum(30e-6)),
-        row("inner corneum 300 \u{b5}m", corneum(300e-6)),
-        row("modulus 20 MPa", RidgeCase { young_modulus_pa: 20e6, ..base }),
-        row("modulus 200 MPa", RidgeCase { young_modulus_pa: 200e6, ..base }),
-        row("Poisson's ratio 0.2", RidgeCase { poisson_ratio: 0.2, ..base }),
-        row("Poisson's ratio 0.45", RidgeCase { poisson_ratio: 0.45, ..base }),
-        row("pressure 3.5 kPa", RidgeCase { mean_pressure_pa: 3.5e3, ..base }),
-        row("pressure 13 kPa", RidgeCase { mean_pressure_pa: 13e3, ..base }),
-        row("penalty 33 E_sc", RidgeCase { penalty_ratio: 33.0, ..base }),
-        row("tangential penalty 0.1 k", RidgeCase { tangential_penalty_ratio: 0.1, ..base }),
-        row("tangential penalty 0.03 k", RidgeCase { tangential_penalty_ratio: 0.03, ..base }),
-        row("layer 1e13 Pa/m", RidgeCase { tangential_stiffness_pa_m: Some(1e13), ..base }),
-        row("layer 3e12 Pa/m", RidgeCase { tangential_stiffness_pa_m: Some(3e12), ..base }),
-        row("layer 1e12 Pa/m", RidgeCase { tangential_stiffness_pa_m: Some(1e12), ..base }),
-        row("layer 5e11 Pa/m", RidgeCase { tangential_stiffness_pa_m: Some(5e11), ..base }),
-        row("layer 2e11 Pa/m", RidgeCase { tangential_stiffness_pa_m: Some(2e11), ..base }),
+        ("as given", base),
+        ("ellipse", profile(RidgeProfile::Ellipse)),
+        ("flat slab", profile(RidgeProfile::Flat)),
+        ("ridge 50 \u{b5}m high", ridge(50e-6)),
+        ("inner corneum 30 \u{b5}m", corneum(30e-6)),
+        ("inner corneum 300 \u{b5}m", corneum(300e-6)),
+        ("modulus 20 MPa", RidgeCase { young_modulus_pa: 20e6, ..base }),
+        ("modulus 200 MPa", RidgeCase { young_modulus_pa: 200e6, ..base }),
+        ("Poisson's ratio 0.2", RidgeCase { poisson_ratio: 0.2, ..base }),
+        ("Poisson's ratio 0.45", RidgeCase { poisson_ratio: 0.45, ..base }),
+        ("pressure 3.5 kPa", RidgeCase { mean_pressure_pa: 3.5e3, ..base }),
+        ("pressure 13 kPa", RidgeCase { mean_pressure_pa: 13e3, ..base }),
+        ("penalty 33 E_sc", RidgeCase { penalty_ratio: 33.0, ..base }),
+        ("tangential penalty 0.1 k", RidgeCase { tangential_penalty_ratio: 0.1, ..base }),
+        ("tangential penalty 0.03 k", RidgeCase { tangential_penalty_ratio: 0.03, ..base }),
+        ("layer 1e13 Pa/m", RidgeCase { tangential_stiffness_pa_m: Some(1e13), ..base }),
+        ("layer 3e12 Pa/m", RidgeCase { tangential_stiffness_pa_m: Some(3e12), ..base }),
+        ("layer 1e12 Pa/m", RidgeCase { tangential_stiffness_pa_m: Some(1e12), ..base }),
+        ("layer 5e11 Pa/m", RidgeCase { tangential_stiffness_pa_m: Some(5e11), ..base }),
+        ("layer 2e11 Pa/m", RidgeCase { tangential_stiffness_pa_m: Some(2e11), ..base }),
     ]
 }
 
 /// What statics do not know: the kernel's other measure of strain, the other friction rule, less damping.
-fn dynamic(base: RidgeCase) -> Vec<Row> {
-    let row = |what: &str, case: RidgeCase| Row { what: what.into(), case };
-    vec![
-        row("small strain", RidgeCase { strain: Strain::Small, ..base }),
-        row("local friction", RidgeCase { friction: FrictionRule::Local, ..base }),
-        row("damping 3.5e5 /s", RidgeCase { mass_damping_per_s: 3.5e5, ..base }),
+fn dynamic(base: RidgeCase) -> [Row; 3] {
+    [
+        ("small strain", RidgeCase { strain: Strain::Small, ..base }),
+        ("local friction", RidgeCase { friction: FrictionRule::Local, ..base }),
+        ("damping 3.5e5 /s", RidgeCase { mass_damping_per_s: 3.5e5, ..base }),
     ]
 }
 
 #[derive(Serialize)]
 struct Answer {
-    what: String,
+    what: &'static str,
     held_at: HeldAt,
     load_over_mean: f64,
     /// Newtons on the whole finger for each N/m on the ridge.
@@ -109,7 +102,7 @@ struct Answer {
 
 #[derive(Serialize)]
 struct Surveyed {
-    what: String,
+    what: &'static str,
     lateral_over_normal: f64,
     lateral_over_normal_at_3_loads: f64,
     psi_star: Option<f64>,
@@ -123,53 +116,49 @@ struct Surveyed {
 }
 
 fn answers(args: &StiffnessArgs) -> Result<Vec<Answer>, RidgeError> {
-    let base = args.base();
     let mut all = Vec::new();
-    let mut ask = |row: &Row, held_at: HeldAt, load_over_mean: f64| -> Result<(), RidgeError> {
-        let found = of_case(&row.case, load_over_mean * row.case.line_load_n_m(), held_at)?;
-        let (what, finger_per_ridge_m) = (row.what.clone(), row.case.finger_per_ridge_m());
+    let mut solve = |(what, case): Row, held_at: HeldAt, load_over_mean: f64| -> Result<(), RidgeError> {
+        let found = of_case(&case, load_over_mean * case.line_load_n_m(), held_at)?;
+        let finger_per_ridge_m = case.finger_per_ridge_m();
         all.push(Answer { what, held_at, load_over_mean, finger_per_ridge_m, found });
         Ok(())
     };
-    let rows = table(base);
+    let rows = table(args.base());
     for held_at in HeldAt::ALL {
         for load in LOADS {
-            ask(&rows[0], held_at, load)?;
+            solve(rows[0], held_at, load)?;
         }
     }
     for row in &rows[1..] {
-        ask(row, HeldAt::CorneumBase, 1.0)?;
-        ask(row, HeldAt::CorneumBase, 3.0)?;
+        solve(*row, HeldAt::CorneumBase, 1.0)?;
+        solve(*row, HeldAt::CorneumBase, 3.0)?;
     }
     Ok(all)
 }
 
 fn survey(args: &StiffnessArgs) -> Result<Vec<Surveyed>, RidgeError> {
-    let of = |row: Row| -> Result<Surveyed, RidgeError> {
-        let load = row.case.line_load_n_m();
-        let ratio = of_case(&row.case, load, HeldAt::CorneumBase)?.lateral_over_normal;
-        let at_3 = of_case(&row.case, 3.0 * load, HeldAt::CorneumBase)?.lateral_over_normal;
-        let fit = short_study::psi_star(row.case, Reading::PeakToPeak)?;
-        let slider = short_study::slider_psi_star(row.case, Reading::PeakToPeak)?;
+    let of = |(what, case): Row| -> Result<Surveyed, RidgeError> {
+        let load = case.line_load_n_m();
+        let lateral_over_normal = of_case(&case, load, HeldAt::CorneumBase)?.lateral_over_normal;
+        let at_3 = of_case(&case, 3.0 * load, HeldAt::CorneumBase)?.lateral_over_normal;
+        let fit = short_study::psi_star(case, Reading::PeakToPeak)?;
+        let slider = short_study::slider_psi_star(case, Reading::PeakToPeak)?;
         Ok(Surveyed {
-            what: row.what,
-            lateral_over_normal: ratio,
+            what,
+            lateral_over_normal,
             lateral_over_normal_at_3_loads: at_3,
             psi_star: fit.map(|f| f.psi_star),
             psi_star_sd: fit.map(|f| f.psi_star_sd),
             rmse: fit.map(|f| f.rmse),
             points: fit.map_or(0, |f| f.points),
             slider_psi_star: slider.map(|f| f.psi_star),
-            psi_star_eq16: fit.map(|f| f.psi_star * (1.0 + row.case.poisson_ratio) * at_3),
+            psi_star_eq16: fit.map(|f| f.psi_star * (1.0 + case.poisson_ratio) * at_3),
         })
     };
     table(args.base()).into_iter().chain(dynamic(args.base())).map(of).collect()
 }
 
 /// Runs the solve or the survey; refuses bad input.
-///
-/// # Errors
-/// An answer that cannot be written.
 pub fn run(args: &StiffnessArgs, json: bool) -> miette::Result<ExitCode> {
     if args.survey {
         let rows = survey(args).map_err(refused)?;
@@ -177,16 +166,7 @@ pub fn run(args: &StiffnessArgs, json: bool) -> miette::Result<ExitCode> {
             answer_json(&rows);
             return Ok(ExitCode::SUCCESS);
         }
-        out!(
-            "{:<25} {:>7} {:>7} {:>14} {:>5} {:>8} {:>6}",
-            "",
-            "k_l/k_n",
-            "at 3 F",
-            "Psi*",
-            "rmse",
-            "slider's",
-            "Eq. 16"
-        );
+        out!("                          k_l/k_n  at 3 F           Psi*  rmse slider's Eq. 16");
         for r in rows {
             let number = |v: Option<f64>| v.map_or("none".into(), |v| format!("{v:.2}"));
             out!(
@@ -218,17 +198,7 @@ pub fn run(args: &StiffnessArgs, json: bool) -> miette::Result<ExitCode> {
         out!("  {of:<32} {ratio:.3}");
     }
     out!("\nBy finite elements; stiffnesses of the whole finger in MN/m, load in multiples of the mean:");
-    out!(
-        "{:<25} {:<7} {:>4} {:>8} {:>7} {:>7} {:>7} {:>8}",
-        "",
-        "held at",
-        "load",
-        "width \u{b5}m",
-        "k_n",
-        "secant",
-        "k_l",
-        "k_l/k_n"
-    );
+    out!("                          held at load width \u{b5}m     k_n  secant     k_l  k_l/k_n");
     for r in &rows {
         let finger = 1e-6 * r.finger_per_ridge_m;
         let held = match r.held_at {

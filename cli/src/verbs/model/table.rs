@@ -3,17 +3,12 @@
 mod phases;
 
 use super::{refused, reproduce};
+use crate::verbs::prelude::*;
 use clap::Args;
-use miette::{IntoDiagnostic, WrapErr};
 use models::ridge::study::content_key;
 use models::ridge::{RidgeCase, case};
 use models::surrogate::{Grid, GridPoint, InterpolationError, Surrogate, TableResult};
-use runs::print::answer_json;
-use runs::{out, say};
-use serde_json::json;
 use std::collections::HashMap;
-use std::path::{Path, PathBuf};
-use std::process::ExitCode;
 use std::time::Instant;
 use studies::cases::file::Header;
 use studies::cases::kinds::table::{self, HELD_OUT};
@@ -83,11 +78,9 @@ pub fn run(args: &TableArgs, json: bool) -> miette::Result<ExitCode> {
         if args.surrogate { surrogate(&args.out) } else { fig_9_study(&args.out, args.study()) }
     })?;
     let seconds = start.elapsed().as_secs_f64();
-    if json {
-        answer_json(&json!({"file": file, "cases": cases, "failed": failed, "wall_seconds": seconds}));
-    } else {
-        out!("{}: {cases} cases, {failed} failed, {seconds:.1} s", file.display());
-    }
+    let document = json!({"file": file, "cases": cases, "failed": failed, "wall_seconds": seconds});
+    let words = format!("{}: {cases} cases, {failed} failed, {seconds:.1} s", file.display());
+    answered(json, &document, words)?;
     Ok(ExitCode::from(u8::from(failed > 0)))
 }
 
@@ -124,12 +117,10 @@ fn surrogate(out: &Path) -> miette::Result<(PathBuf, usize, usize)> {
     let file = out.join("ridge_table.txt");
     let text = Surrogate::table_text(&grid, result, error).into_diagnostic()?;
     runs::files::write_whole(&file, text)?;
+    let InterpolationError { cases, mu_rms, mu_max, phase_rms_deg, .. } = error;
     say!(
-        "interpolation error on {} held-out cases: mu' rms {:.4}, worst {:.4}; phase rms {:.1} deg",
-        error.cases,
-        error.mu_rms,
-        error.mu_max,
-        error.phase_rms_deg
+        "interpolation error on {cases} held-out cases: mu' rms {mu_rms:.4}, worst {mu_max:.4}; \
+         phase rms {phase_rms_deg:.1} deg"
     );
     Ok((file, points.len() + held_out.len(), failed))
 }

@@ -1,14 +1,11 @@
 //! `muprime model tabulate`: a law that a program computes, as a table that the loop and the diagnosis read.
 
+use crate::verbs::prelude::*;
 use clap::Args;
-use miette::{IntoDiagnostic, WrapErr};
 use models::law_table::ANSWERS;
 use models::law_table::grid::Grid;
-use runs::out;
-use serde_json::json;
 use std::io::Write;
-use std::path::PathBuf;
-use std::process::{Command, ExitCode, Stdio};
+use std::process::{Command, Stdio};
 
 /// Arguments of `muprime model tabulate`.
 #[derive(Args)]
@@ -36,11 +33,8 @@ pub struct TabulateArgs {
     checks: usize,
 }
 
-/// Tabulates, checks, writes.
-///
-/// # Errors
-/// A grid that is none, a program that fails or answers what is no law, a table that is too coarse; nothing
-/// is written then.
+/// Tabulates, checks, writes; refused: a grid that is none, a program that fails or answers what is no law, a
+/// table that is too coarse; nothing is written then.
 pub fn run(args: &TabulateArgs, json: bool) -> miette::Result<ExitCode> {
     let grid = Grid::parse(args.grid.iter().map(String::as_str)).map_err(|e| miette::miette!("{e}"))?;
     let answers = answers(&args.command, &conditions(&grid, args.checks))?;
@@ -55,24 +49,20 @@ pub fn run(args: &TabulateArgs, json: bool) -> miette::Result<ExitCode> {
     let origin = format!("command {}", args.command);
     let (text, sha256) = tables::law::file_of(&made, &origin, tolerance)?;
     runs::files::write_output(&args.out, text)?;
-    if json {
-        let made = json!({
-            "file": args.out, "rows": answers.len() - made.checks, "sha256": sha256, "checks": made.checks,
-            "error_greatest": made.greatest, "error_greatest_at": made.place, "error_rms": made.rms,
-        });
-        out!("{made}");
-    } else {
-        out!(
-            "{}: {} rows; against {} fresh calls mu' differs by {:.4} at most (at {}), rms {:.4}",
-            args.out.display(),
-            answers.len() - made.checks,
-            made.checks,
-            made.greatest,
-            made.place,
-            made.rms
-        );
-    }
-    Ok(ExitCode::SUCCESS)
+    let rows = answers.len() - made.checks;
+    let document = json!({
+        "file": args.out, "rows": rows, "sha256": sha256, "checks": made.checks,
+        "error_greatest": made.greatest, "error_greatest_at": made.place, "error_rms": made.rms,
+    });
+    let words = format!(
+        "{}: {rows} rows; against {} fresh calls mu' differs by {:.4} at most (at {}), rms {:.4}",
+        args.out.display(),
+        made.checks,
+        made.greatest,
+        made.place,
+        made.rms
+    );
+    answered(json, &document, words)
 }
 
 /// What the program reads.

@@ -1,24 +1,18 @@
 //! `muprime run CAMPAIGN.toml`: the sessions of a campaign that are missing, then its page.
 
-use super::{Args, Watching, job_of, measure, new_name};
-use miette::IntoDiagnostic;
+use super::{Args, job_of, measure, new_name, serve};
+use crate::verbs::prelude::*;
 use runs::campaign::{self, Campaign};
 use runs::catalogue::runs_folder;
-use runs::print::answer_json;
-use runs::say;
 use runs::session::Job;
-use std::path::{Path, PathBuf};
-use std::process::ExitCode;
 use studies::campaign::claims::Claim;
 
 /// The page of a campaign, in its folder.
 pub const PAGE: &str = "campaign.html";
 
 /// Measures what is missing. On a virtual rig every session; on a rig with instruments one, since a person
-/// changes the tip.
-///
-/// # Errors
-/// A refusal, before anything was measured: any session that a setup cannot do among them.
+/// changes the tip. A refusal comes before anything was measured: any session that a setup cannot do among
+/// them.
 pub fn run(mut args: Args, text: &str, folder: &Path, json: bool) -> miette::Result<ExitCode> {
     if args.seed.is_some() {
         miette::bail!(
@@ -52,7 +46,7 @@ pub fn run(mut args: Args, text: &str, folder: &Path, json: bool) -> miette::Res
         job(session)?.points()?;
     }
     campaign.open(&out)?;
-    let watching = Watching::begin(&mut args, &out.join("sessions"))?;
+    serve(&mut args, &out.join("sessions"))?;
     let mut whole = true;
     for session in &all {
         if campaign::is_complete(&out.join(&session.folder)) {
@@ -62,38 +56,30 @@ pub fn run(mut args: Args, text: &str, folder: &Path, json: bool) -> miette::Res
         let job = job(session)?;
         let instruments = !job.fast && job.setup.file.virtual_rig.is_none();
         if !json {
-            let condition = if cell.condition.is_empty() { "" } else { ", " };
-            say!(
-                "session {} of {}, block {}: {}{condition}{}",
-                session.number,
-                all.len(),
-                session.block,
-                cell.name,
-                cell.condition
-            );
+            let campaign::Session { number, block, .. } = session;
+            let (comma, condition) = (if cell.condition.is_empty() { "" } else { ", " }, &cell.condition);
+            say!("session {number} of {}, block {block}: {}{comma}{condition}", all.len(), cell.name);
         }
         let planned = job.points()?.len();
-        whole = measure(job, planned, &watching, json)?;
+        whole = measure(job, planned, &args, json)?;
         if !whole || instruments {
             break;
         }
     }
     let (claims, made, _) = write(&out)?;
     if json {
-        answer_json(&serde_json::json!({ "campaign": {
+        answer_json(&json!({ "campaign": {
                 "folder": out, "sessions": made, "planned": all.len(), "claims": claims
             } }));
     } else {
         tell(&claims, made, all.len(), &out);
     }
-    crate::verbs::exit(if whole { crate::verbs::DONE } else { crate::verbs::FAILED })
+    exit(if whole { DONE } else { FAILED })
 }
 
-/// Writes the page of a campaign's folder, and its answers as JSON beside it; gives the answers, the
-/// sessions that they rest on, and how many are planned.
-///
-/// # Errors
-/// A folder that holds no campaign, or cannot be written.
+/// Writes the page of a campaign's folder, and its answers as JSON beside it; gives the answers, the sessions
+/// that they rest on, and how many are planned; refused: a folder that holds no campaign, or cannot be
+/// written.
 pub fn write(folder: &Path) -> miette::Result<(Vec<Claim>, usize, usize)> {
     let (file, made) = studies::campaign::measured(folder)?;
     let (html, claims) = studies::campaign::page(&file, &made)?;

@@ -43,10 +43,8 @@ const FOREIGN: [(&str, &str, f64); 7] = [
     ("lateral_force_n", "Lateral force (mN)", 1e3),
 ];
 
-/// Measures a sample into a folder that is not there yet, and returns the table.
-///
-/// # Errors
-/// A folder that is there, or that cannot be written.
+/// Measures a sample into a folder that is not there yet, and returns the table; refused: a folder that is
+/// there, or that cannot be written.
 pub fn write(sample: Sample, folder: &Path) -> miette::Result<PathBuf> {
     if folder.exists() {
         miette::bail!(help = "give another folder with --out", "{} is there already", folder.display());

@@ -1,9 +1,9 @@
 //! What is owed, what is handed out, and what counts as read back, for each kind of instrument.
 
-use super::super::tests::{amplifier, on, sent, show};
+use super::super::tests::{DriveSetPoint, amplifier, on, sent, show};
 use super::*;
 use crate::InstrumentSetup;
-use crate::ports::{DriveSetPoint, StagePort, StageSetPoint, SupplyPort};
+use crate::ports::{StagePort, SupplyPort};
 use crate::profile;
 use realtime::ports::{Amplifier, ForceSensor, SafetyInputs, Stage, SupplyCommand, SupplySwitch};
 
@@ -18,9 +18,8 @@ fn supply() -> (Endpoint, SupplyPort) {
 
 /// The loop's command to a stage. Only the loop can make one that moves, so it is put where the loop's port would put it.
 fn ask(endpoint: &Endpoint, velocity_m_s: f64, normal_force_n: f64) {
-    let command = StageSetPoint { velocity_m_s, normal_force_n, sequence: 3, expires_at: Nanos(100) };
-    let Part::Stage { link, .. } = &endpoint.part else { panic!("a stage") };
-    link.commands.put(command, command.rests());
+    let command = SetPoint::of_stage(velocity_m_s, normal_force_n, 3, Nanos(100));
+    endpoint.orders.commands.put(command, !command.on);
 }
 
 fn show_closed(endpoint: &mut Endpoint, closed: bool, arrived: u64) {

@@ -38,9 +38,8 @@ impl Compiler<'_> {
         for signal in poll.sequence.iter().chain(&poll.device_time) {
             let here = |frame: &Option<String>| frame.as_ref().is_none_or(|frame| frame == name);
             if !self.description.signal.iter().any(|s| s.name.as_ref() == signal && here(&s.frame)) {
-                return Err(
-                    self.at_name(&poll.name, format!("`{signal}` of poll `{name}` is not a signal in it"))
-                );
+                let why = format!("`{signal}` of poll `{name}` is not a signal in it");
+                return self.refuse_named(&poll.name, why);
             }
         }
         Ok(())
@@ -66,7 +65,7 @@ impl Compiler<'_> {
     pub(super) fn check_stream(&self) -> Result<(), ProfileError> {
         let d = self.description;
         let Some(stream) = &d.stream else { return Ok(()) };
-        let wrong = |why: &str| Err(self.at_text("[stream]", format!("[stream]: {why}")));
+        let wrong = |why: &str| self.refuse("[stream]", format!("[stream]: {why}"));
         let free = matches!(d.link.kind, LinkKind::Serial | LinkKind::Tcp | LinkKind::Udp);
         let datagrams = d.link.kind == LinkKind::Udp;
         let starts = stream.start_register.is_some() || stream.start_function.is_some();
@@ -139,18 +138,14 @@ impl Compiler<'_> {
                 FrameKind::Poll(_) | FrameKind::Query(_) => None,
             };
             let stands = |name: &str| {
-                let own = |signal: &&CompiledSignal| {
+                let own = |signal: &CompiledSignal| {
                     signal.frame.0 == index && !matches!(signal.place, Place::Computed(_))
                 };
-                d.signal
-                    .iter()
-                    .zip(signals)
-                    .filter(|(_, s)| own(s))
-                    .any(|(signal, _)| signal.name.as_ref() == name)
+                d.signal.iter().zip(signals).any(|(signal, s)| own(s) && signal.name.as_ref() == name)
             };
             if let Some(name) = named.filter(|name| !stands(name)) {
                 let why = format!("`sequence` of `{}`: `{name}` is not a signal in it", frame.name);
-                return Err(self.at_text(&format!("\"{name}\""), why));
+                return self.refuse(&format!("\"{name}\""), why);
             }
             if let Some(crate::codec::text::Form::Pattern(pattern)) = &frame.text
                 && let Some((name, _)) = pattern.fields().find(|(name, _)| !stands(name))

@@ -58,11 +58,8 @@ fn depth(heights: &[f64], load: f64) -> f64 {
     let n = heights.len() as f64;
     let mut depth = load;
     for _ in 0..heights.len() {
-        let (sum, touching) = heights
-            .iter()
-            .map(|h| h + depth)
-            .filter(|&d| d > 0.0)
-            .fold((0.0, 0.0), |s, d| (s.0 + d, s.1 + 1.0));
+        let touching = heights.iter().map(|h| h + depth).filter(|&d| d > 0.0);
+        let (sum, touching) = touching.fold((0.0, 0.0), |s, d| (s.0 + d, s.1 + 1.0));
         let excess = sum - load * n;
         if excess < 1e-12 * load * n || touching == 0.0 {
             break;

@@ -199,9 +199,8 @@ impl Oscillator {
         let (p, q) = drive;
         let (sine, cosine) =
             if norm > 0.0 { ((d * p + e * q) / norm, (d * q - e * p) / norm) } else { (0.0, 0.0) };
-        let mut own = Oscillator { gamma, stiffness, sine, cosine, pull, step: [0.0; 4] };
-        own.step = own.transition(h);
-        own
+        let own = Oscillator { gamma, stiffness, sine, cosine, pull, step: [0.0; 4] };
+        Oscillator { step: own.transition(h), ..own }
     }
 
     /// Transition matrix of the free motion over a time.
@@ -245,15 +244,11 @@ fn oscillators(ratio: f64, damping: f64, landing: Surface, h: f64) -> [Oscillato
     let ridge = 2.0 * damping * ratio;
     let (surface, dashpot) = (landing.stiffness, landing.dashpot(ratio));
     let pull = landing.ridge() / inertia;
+    let (gamma, stiffness) = (0.5 * (ridge + dashpot) / inertia, (landing.ridge() + surface) / inertia);
+    let drive = (surface / inertia, dashpot / inertia);
     [
         Oscillator::new(0.5 * ridge / inertia, pull, (0.0, 0.0), pull, h),
-        Oscillator::new(
-            0.5 * (ridge + dashpot) / inertia,
-            (landing.ridge() + surface) / inertia,
-            (surface / inertia, dashpot / inertia),
-            pull,
-            h,
-        ),
+        Oscillator::new(gamma, stiffness, drive, pull, h),
     ]
 }
 
@@ -312,13 +307,11 @@ impl Bouncing {
                 let start = if touching { force_at(turned, phase).max(0.0) } else { 0.0 };
                 state = other.advance(&other.transition(h - part), turned, depth, phase, (sin, cos));
                 let end = if touching { force_at(state, (sin, cos)).max(0.0) } else { 0.0 };
+                stretch = [0.0; N];
                 if touching {
-                    stretch = [0.0; N];
                     slide(&mut stretch, &mut now, drags, h - part, (start, end));
                     mean += 0.5 * (start + end) * (h - part);
                     touched += h - part;
-                } else {
-                    stretch = [0.0; N];
                 }
                 force = end;
             }
@@ -327,9 +320,7 @@ impl Bouncing {
             if settled {
                 carried += mean;
                 counted += 1;
-                for n in 0..N {
-                    sums[n] += now[n];
-                }
+                sums.iter_mut().zip(&now).for_each(|(sum, now)| *sum += now);
                 // A motion that repeats needs no average.
                 if quiet >= 3 || counted == CYCLES.1 {
                     break;

@@ -37,11 +37,7 @@ impl Retarded {
             if over.abs() < FOUND {
                 return contact;
             }
-            if over > 0.0 {
-                high = depth
-            } else {
-                low = depth
-            }
+            (low, high) = if over > 0.0 { (low, depth) } else { (depth, high) };
             if high - low < FOUND {
                 // Between a contact that lasts almost the whole cycle and one that never ends.
                 return if reach - high < 2.0 * FOUND { whole } else { contact };
@@ -88,11 +84,7 @@ fn meets(lowest: f64, guess: f64, gap: impl Fn(f64) -> (f64, f64)) -> Option<f64
     let mut x = if guess > low && guess < high { guess } else { 0.5 * (low + high) };
     for _ in 0..60 {
         let (value, slope) = gap(x);
-        if value > 0.0 {
-            high = x
-        } else {
-            low = x
-        }
+        (low, high) = if value > 0.0 { (low, x) } else { (x, high) };
         let newton = x - value / slope;
         if (newton - x).abs() < LAST_STEP && newton > lowest {
             return Some(newton);

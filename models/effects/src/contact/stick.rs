@@ -50,11 +50,7 @@ impl Began {
                 return (here - 0.5 * gap * newton).max(0.0);
             }
             // Left of the maximum the gap rises: the root lies to the right whatever its sign.
-            if gap > 0.0 || slope >= 0.0 {
-                low = x;
-            } else {
-                high = x;
-            }
+            (low, high) = if gap > 0.0 || slope >= 0.0 { (x, high) } else { (low, x) };
             let next = x - if slope < 0.0 { gap / (slope + 0.5 * newton * cos) } else { f64::NAN };
             x = if next > low && next < high { next } else { 0.5 * (low + high) };
             if high - low < 1e-9 {

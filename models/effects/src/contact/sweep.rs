@@ -135,16 +135,10 @@ impl Lateral {
         let slow = c.lateral_relaxation_time / (1.0 - c.relaxation_growth);
         let growth = c.relaxation_growth / ((1.0 - c.relaxation_growth) * STATED_STRETCH_M);
         let grown = |time: f64| if slow > 0.0 { -growth * (-time / slow).exp_m1() } else { 0.0 };
-        let keep = |time: f64| {
-            if time < 1e-15 {
-                1.0
-            } else if c.lateral_relaxation_time > 0.0 {
-                (-time / slow).exp()
-            } else if rate.is_finite() {
-                1.0
-            } else {
-                0.0
-            }
+        let keep = |time: f64| match c.lateral_relaxation_time > 0.0 {
+            _ if time < 1e-15 => 1.0,
+            true => (-time / slow).exp(),
+            false => f64::from(u8::from(rate.is_finite())),
         };
         let fall = |time: f64| if rate.is_finite() { rate * time } else { 0.0 };
         Self {
@@ -279,19 +273,11 @@ pub(crate) fn root(low: f64, high: f64, width: f64, f: impl Fn(f64) -> f64) -> O
         if fx.abs() < 1e-10 {
             return Some(x);
         }
-        if fx > 0.0 {
-            (b, fb) = (x, fx);
-            if side == 1 {
-                fa *= 0.5;
-            }
-            side = 1;
-        } else {
-            (a, fa) = (x, fx);
-            if side == -1 {
-                fb *= 0.5;
-            }
-            side = -1;
-        }
+        let (before, above) = (side, fx > 0.0);
+        side = if above { 1 } else { -1 };
+        // An end that stays twice counts half.
+        let half = if before == side { 0.5 } else { 1.0 };
+        ((a, fa), (b, fb)) = if above { ((a, half * fa), (x, fx)) } else { ((x, fx), (b, half * fb)) };
     }
     Some(0.5 * (a + b))
 }

@@ -3,7 +3,6 @@
 use super::prelude::*;
 use crate::contact::{STILL_PLATE_M, half_contact_angle};
 
-/// What sees it without friction.
 const CHECK: &str = "Measure the plate with a vibrometer while the finger is pressed on it.";
 
 pub(super) static EFFECT: Effect = Effect {

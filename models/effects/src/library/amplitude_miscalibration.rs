@@ -2,7 +2,6 @@
 
 use super::prelude::*;
 
-/// What sees it without friction.
 const CHECK: &str = "Measure the plate with a vibrometer at three drives.";
 
 /// Below this share of the largest amplitude a gain changes no further; beyond these e-folds it is none.

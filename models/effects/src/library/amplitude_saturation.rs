@@ -2,7 +2,6 @@
 
 use super::prelude::*;
 
-/// What sees it without friction.
 const CHECK: &str = "Measure the plate with a vibrometer at the largest drives.";
 
 pub(super) static EFFECT: Effect = Effect {

@@ -1,7 +1,8 @@
 //! Bonds need time to form after each touch-down.
 
 use super::prelude::*;
-use crate::contact::Bonds;
+use crate::contact::{Bonds, STILL_PLATE_M, half_contact_angle};
+use std::f64::consts::PI;
 
 /// Speed below which junctions get no older, m/s.
 const LEAST_SPEED: f64 = 1e-6;
@@ -36,12 +37,11 @@ pub(super) static EFFECT: Effect = Effect {
     needs: &[Need::Vibration],
     change: |law, theta, _, _, c| match law {
         2 => {
-            if c.amplitude_pp > crate::contact::STILL_PLATE_M {
-                let phi = crate::contact::half_contact_angle(c.load_ratio(), 0.0);
-                if phi < std::f64::consts::PI {
-                    let time = phi / (std::f64::consts::PI * c.frequency);
-                    c.mu0 *= 1.0 - theta[1] * theta[0] / (time + theta[0]);
-                }
+            let vibrates = c.amplitude_pp > STILL_PLATE_M;
+            let phi = if vibrates { half_contact_angle(c.load_ratio(), 0.0) } else { PI };
+            if phi < PI {
+                let time = phi / (PI * c.frequency);
+                c.mu0 *= 1.0 - theta[1] * theta[0] / (time + theta[0]);
             }
         }
         // Of size zero they are there at once.

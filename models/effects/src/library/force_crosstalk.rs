@@ -2,7 +2,6 @@
 
 use super::prelude::*;
 
-/// What sees it without friction.
 const CHECK: &str =
     "Press on the sensor with a dead weight and no motion, plate levelled; read the lateral axis.";
 

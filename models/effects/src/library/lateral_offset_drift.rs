@@ -2,7 +2,6 @@
 
 use super::prelude::*;
 
-/// What sees it without friction.
 const CHECK: &str = "Lift the finger every few passes and read the lateral force.";
 
 const OFFSET: Parameter = Parameter::signed("offset", "N", 0.01, -0.3, 0.3);

@@ -45,13 +45,8 @@ pub(super) static EFFECT: Effect = Effect {
         match law {
             0 => (c.inverse_recovery_speed, c.recovery_knee) = (theta[0], theta[1]),
             3 => {
-                c.held = Held {
-                    share: theta[0],
-                    time: theta[1],
-                    spread: theta[2],
-                    of_mean: theta[3],
-                    elastic: theta[4],
-                }
+                let [share, time, spread, of_mean, elastic] = *theta else { return };
+                c.held = Held { share, time, spread, of_mean, elastic };
             }
             _ => (c.lateral_relaxation_time, c.relaxation_growth) = (theta[0], theta[1]),
         }

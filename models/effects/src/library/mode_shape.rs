@@ -4,7 +4,6 @@ use super::prelude::*;
 use libm::j0;
 use std::f64::consts::PI;
 
-/// What sees it without friction.
 const CHECK: &str = "Scan the plate with a vibrometer along the stroke.";
 
 /// Least square of the amplitude at a node over that at an antinode: a finger is wider than a node.

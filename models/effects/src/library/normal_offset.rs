@@ -2,7 +2,6 @@
 
 use super::prelude::*;
 
-/// What sees it without friction.
 const CHECK: &str = "Lift the finger and read the normal force; put a dead weight on it.";
 
 pub(super) static EFFECT: Effect = Effect {

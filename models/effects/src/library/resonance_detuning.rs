@@ -4,7 +4,6 @@
 
 use super::prelude::*;
 
-/// What sees it without friction.
 const CHECK: &str = "Retune the drive (sweep its frequency) at the start and the end of a run.";
 
 const PER_KELVIN: Parameter = Parameter::positive("detuning_per_kelvin", "1/K", 0.15, 5.0);

@@ -2,7 +2,6 @@
 
 use super::prelude::*;
 
-/// What sees it without friction.
 const CHECK: &str = "Time the stage over its stroke, or read its encoder.";
 
 pub(super) static EFFECT: Effect = Effect {

@@ -15,7 +15,6 @@ const FARTHEST: f64 = 60.0;
 /// Bluntness below which the film ends as an exponential does: the difference is of the order of it.
 const STEEPEST: f64 = 1e-6;
 
-/// What sees it without friction.
 const CHECK: &str = "Repeat the largest amplitudes at an ambient pressure of 20 kPa.";
 
 /// Shapes of a film whose lift goes with powers of amplitude, frequency and load, and which ends between a
@@ -63,13 +62,8 @@ pub(super) static EFFECT: Effect = Effect {
         match law {
             0 => c.solid_share *= film_share(theta[0] * c.half_amplitude(), air, c.normal_force / size),
             1 => {
-                let film = theta[1] * AIR_SCALE_N * air * size;
-                c.solid_share *= finite_film_share(
-                    theta[0] * c.half_amplitude(),
-                    film,
-                    [theta[2], theta[3]],
-                    c.normal_force,
-                );
+                let (a, film) = (theta[0] * c.half_amplitude(), theta[1] * AIR_SCALE_N * air * size);
+                c.solid_share *= finite_film_share(a, film, [theta[2], theta[3]], c.normal_force);
             }
             2 => c.solid_share *= share_by_powers(theta, pass, design, c),
             _ => c.friction_factor *= share_by_powers(theta, pass, design, c),

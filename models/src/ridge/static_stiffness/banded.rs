@@ -43,11 +43,8 @@ impl Banded {
                 let place = self.place(i, j);
                 if i == j {
                     if !(rest > 0.0 && rest.is_finite()) {
-                        return Err(RidgeError::input(
-                            format!("pivot {i} of the stiffness matrix"),
-                            rest,
-                            "above 0: something must hold the body",
-                        ));
+                        let what = format!("pivot {i} of the stiffness matrix");
+                        return Err(RidgeError::input(what, rest, "above 0: something must hold the body"));
                     }
                     self.rows[place] = rest.sqrt();
                 } else {

@@ -53,9 +53,8 @@ pub(super) fn messages(
                 match mcap::parse_record(opcode, data).map_err(|e| e.to_string())? {
                     Record::Channel(channel) => {
                         let kind = TOPICS.iter().position(|topic| *topic == channel.topic);
-                        let kind =
-                            kind.ok_or_else(|| format!("no record has the topic '{}'", channel.topic))?;
-                        kinds.insert(channel.id, kind);
+                        let unknown = || format!("no record has the topic '{}'", channel.topic);
+                        kinds.insert(channel.id, kind.ok_or_else(unknown)?);
                     }
                     Record::Message { header, data } => {
                         let kind = *kinds.get(&header.channel_id).ok_or("a message is of no channel")?;
@@ -84,8 +83,7 @@ pub(super) fn messages(
 /// are, and counts below zero where one is too long.
 fn fits(mut records: &[u8]) -> bool {
     while let Some((head, rest)) = records.split_first_chunk::<9>() {
-        let length =
-            u64::from_le_bytes([head[1], head[2], head[3], head[4], head[5], head[6], head[7], head[8]]);
+        let length = u64::from_le_bytes(head[1..].try_into().expect("eight bytes"));
         let Some(rest) = usize::try_from(length).ok().and_then(|n| rest.get(n..)) else { return false };
         records = rest;
     }

@@ -44,7 +44,7 @@ pub(super) fn sound(opcode: u8, body: &[u8], wanted: Wanted) -> Result<Sound, St
     }
     match record {
         Record::Chunk { header, data } => chunk::messages(&header, &data, body, wanted).map(Sound::Chunk),
-        Record::MessageIndex(_) => Ok(Sound::Nothing),
+        Record::MessageIndex(_) | Record::Header(_) => Ok(Sound::Nothing),
         Record::Attachment { header, data, crc } => {
             if crc == 0 {
                 return Err(format!("the attached file '{}' has no checksum", header.name));
@@ -66,7 +66,6 @@ pub(super) fn sound(opcode: u8, body: &[u8], wanted: Wanted) -> Result<Sound, St
             }
         }
         Record::DataEnd(end) => Ok(Sound::DataEnd(end.data_section_crc)),
-        Record::Header(_) => Ok(Sound::Nothing),
         _ => Err("a record of the format is out of place".into()),
     }
 }

@@ -109,13 +109,10 @@ impl Drive {
             self.go_on()?;
             if began.elapsed().as_secs_f64() > ARM_WITHIN_S {
                 let waits_for = self.seen().row.and_then(|row| row.waits_for);
-                let cause =
-                    waits_for.or(self.seen().tripped.map(|trip| trip.cause)).unwrap_or(Cause::SupplySwitch);
-                miette::bail!(
-                    help = cause.remedy(),
-                    "the rig does not arm within {ARM_WITHIN_S} s: {}",
-                    cause.words()
-                );
+                let tripped = || self.seen().tripped.map(|trip| trip.cause);
+                let cause = waits_for.or_else(tripped).unwrap_or(Cause::SupplySwitch);
+                let (help, words) = (cause.remedy(), cause.words());
+                miette::bail!(help = help, "the rig does not arm within {ARM_WITHIN_S} s: {words}");
             }
             self.rig.send(Command::Set(Request::default(), Marker::default()));
             self.rig.send(Command::Reset);

@@ -1,13 +1,16 @@
 //! A target from a file: a table, or a row of an image.
 
 use super::{MOST, RenderPlan};
-use crate::input::{BadInput, place_of, text_of};
+use crate::input::{BadInput, text_of};
 use crate::plan::Plan;
 use models::target::Target;
 use std::path::{Path, PathBuf};
 
 /// Bytes of an image at most.
 const MOST_BYTES: usize = 64 << 20;
+
+/// A problem of a file, and the remedy.
+type Refused = (String, &'static str);
 
 impl RenderPlan {
     /// The file, beside the plan.
@@ -21,53 +24,45 @@ impl RenderPlan {
         let path = self.path(plan);
         let text = text_of(&path)?;
         let shown = path.display().to_string();
-        let refuse = |problem: String, remedy: &str| -> miette::Report {
-            BadInput::new(&shown, &text, None, problem, remedy.to_string()).into()
-        };
-        let full_n = mu0 * plan.file.base.normal_force_n;
+        self.rows(&text, mu0 * plan.file.base.normal_force_n).map_err(|(problem, remedy)| {
+            BadInput::new(&shown, &text, None, format!("{shown}{problem}"), remedy.to_string()).into()
+        })
+    }
+
+    /// The same from the file's text; `full_n` is the friction without vibration in N.
+    fn rows(&self, text: &str, full_n: f64) -> Result<Target, Refused> {
         let mut lines = text.lines().enumerate().filter(|(_, l)| !l.trim().is_empty() && !l.starts_with('#'));
         let head = lines.next().map_or("", |(_, l)| l.trim());
         let scale = match head {
             "x_m,mu_relative" => 1.0,
             "x_m,lateral_force_n" => 1.0 / full_n,
             _ => {
-                let problem = format!("{shown} begins with '{head}'");
-                return Err(refuse(problem, "a target's columns are x_m,mu_relative or x_m,lateral_force_n"));
+                let problem = format!(" begins with '{head}'");
+                return Err((problem, "a target's columns are x_m,mu_relative or x_m,lateral_force_n"));
             }
         };
         let mut points: Vec<[f64; 2]> = Vec::new();
         for (i, line) in lines {
             let cells = line.split_once(',').map(|(x, v)| [x, v].map(|c| c.trim().parse::<f64>()));
             let Some([Ok(x), Ok(v)]) = cells else {
-                return Err(refuse(
-                    format!("{shown}: line {}: '{line}' is not two numbers", i + 1),
-                    "write x_m,value",
-                ));
+                return Err((format!(": line {}: '{line}' is not two numbers", i + 1), "write x_m,value"));
             };
             let mu = v * scale;
             if !(mu > 0.0 && mu <= 1.0) || points.last().is_some_and(|p| x <= p[0]) {
-                let problem = format!("{shown}: line {}: mu' = {mu} at {x} m", i + 1);
-                return Err(refuse(
-                    problem,
-                    "mu' is above 0 and at most 1, and x_m increases from line to line",
-                ));
+                let problem = format!(": line {}: mu' = {mu} at {x} m", i + 1);
+                return Err((problem, "mu' is above 0 and at most 1, and x_m increases from line to line"));
             }
             points.push([x, mu]);
         }
         let [Some(first), Some(last)] = [points.first(), points.last()] else {
-            return Err(refuse(
-                format!("{shown} has no values"),
-                "a target has at least two lines of values",
-            ));
+            return Err((" has no values".into(), "a target has at least two lines of values"));
         };
         let finest = points.windows(2).map(|p| p[1][0] - p[0][0]).fold(f64::INFINITY, f64::min);
         let length = last[0] - first[0];
         let count = (length / finest).ceil() + 1.0;
         if !(2.0..=MOST).contains(&count) {
-            return Err(refuse(
-                format!("{shown}: {count} values on its finest step"),
-                "at most 200000, and at least two",
-            ));
+            let problem = format!(": {count} values on its finest step");
+            return Err((problem, "at most 200000, and at least two"));
         }
         let step_m = length / (count - 1.0);
         let at = |i: usize| {
@@ -76,49 +71,37 @@ impl RenderPlan {
             let [a, b] = [points[k - 1], points[k]];
             a[1] + (b[1] - a[1]) * (x - a[0]) / (b[0] - a[0])
         };
-        Ok(Target {
-            start_m: first[0],
-            step_m,
-            mu_relative: (0..count as usize).map(at).collect(),
-            lead_s: self.lead_s,
-            feedback: None,
-        })
+        let mu_relative = (0..count as usize).map(at).collect();
+        Ok(Target { start_m: first[0], step_m, mu_relative, lead_s: self.lead_s, feedback: None })
     }
 
     /// A target from a row of a grey PNG, whose middle lies at this position in m.
     pub(super) fn image(&self, plan: &Plan, middle_m: f64) -> miette::Result<Target> {
         let path = self.path(plan);
-        let refuse = |problem: String, remedy: &str| -> miette::Report {
-            let place = place_of(&plan.text, &["render", "file"]);
-            BadInput::new(
-                &plan.origin,
-                &plan.text,
-                place,
-                format!("{}: {problem}", path.display()),
-                remedy.to_string(),
-            )
-            .into()
-        };
-        let unread = |e: &dyn std::fmt::Display| refuse(e.to_string(), "give a PNG image");
-        let file = std::fs::File::open(&path).map_err(|e| unread(&e))?;
+        self.pixels(&path, middle_m).map_err(|(problem, remedy)| {
+            let problem = format!("{}: {problem}", path.display());
+            plan.refused(&["render", "file"], problem, remedy.to_string()).into()
+        })
+    }
+
+    fn pixels(&self, path: &Path, middle_m: f64) -> Result<Target, Refused> {
+        let unread = |e: &dyn std::fmt::Display| (e.to_string(), "give a PNG image");
+        let file = std::fs::File::open(path).map_err(|e| unread(&e))?;
         let mut decoder = png::Decoder::new(std::io::BufReader::new(file));
         decoder.set_transformations(png::Transformations::EXPAND);
         let mut reader = decoder.read_info().map_err(|e| unread(&e))?;
         if reader.output_color_type().0 != png::ColorType::Grayscale {
-            return Err(refuse(
-                "the image is not grey".into(),
-                "save it as a grey image without transparency",
-            ));
+            return Err(("the image is not grey".into(), "save it as a grey image without transparency"));
         }
         let (width, height) = (reader.info().width, reader.info().height);
         let row = self.row.unwrap_or(height / 2);
         if row >= height || width < 2 || f64::from(width) > MOST {
             let problem = format!("row {row} of {width} x {height} pixels");
-            return Err(refuse(problem, "rows count from 0; a row has 2 to 200000 pixels"));
+            return Err((problem, "rows count from 0; a row has 2 to 200000 pixels"));
         }
         // Before anything is reserved: the size is what the file states of itself.
         let Some(size) = reader.output_buffer_size().filter(|size| *size <= MOST_BYTES) else {
-            return Err(refuse(format!("{width} x {height} pixels"), "crop the image to 64 MB and less"));
+            return Err((format!("{width} x {height} pixels"), "crop the image to 64 MB and less"));
         };
         let mut pixels = vec![0; size];
         let frame = reader.next_frame(&mut pixels).map_err(|e| unread(&e))?;

@@ -1,8 +1,9 @@
 //! The gap over the operating space as tables of cells: read without colour, by a screen reader and in print.
 //! Every pass is a mark in its cell, and leads to the numbers of the pass.
 
-use crate::report::html::{column, escape, note, table};
-use crate::report::human::number;
+use crate::report::html::{column, escape, note, row, table};
+use crate::report::human::{number, titled};
+use crate::report::plots::ends;
 use diagnosis::data::Table;
 use models::covariate::{self, Covariate};
 
@@ -20,30 +21,18 @@ const DEEPEST: [[f64; 3]; 2] = [[58.0, 148.0, 207.0], [213.0, 94.0, 0.0]];
 /// Mean error of `mu'` in every part of the operating space, before and after, on one scale: `errors` are
 /// measured less predicted over full friction, positive where more friction was measured.
 pub fn section(points: &Table, errors: &[(f64, f64)]) -> String {
-    let varied: Vec<&Covariate> =
-        [&covariate::SPEED, &covariate::FREQUENCY, &covariate::NORMAL_FORCE, &covariate::TIME]
-            .into_iter()
-            .filter(|c| edges(points, c).is_some_and(|e| e.len() > 2))
-            .collect();
-    let rows = if edges(points, &covariate::AMPLITUDE).is_some_and(|e| e.len() > 2) {
-        &covariate::AMPLITUDE
-    } else {
-        &covariate::NORMAL_FORCE
-    };
-    let maps: Vec<Map<'_>> = varied
-        .into_iter()
-        .filter(|c| c.name != rows.name)
-        .take(3)
-        .filter_map(|columns| Map::of(points, errors, rows, columns))
-        .collect();
+    let varies = |c: &&Covariate| edges(points, c).is_some_and(|e| e.len() > 2);
+    let rows = Some(&covariate::AMPLITUDE).filter(varies).unwrap_or(&covariate::NORMAL_FORCE);
+    let columns = [&covariate::SPEED, &covariate::FREQUENCY, &covariate::NORMAL_FORCE, &covariate::TIME];
+    let columns = columns.into_iter().filter(varies).filter(|c| c.name != rows.name).take(3);
+    let maps: Vec<Map<'_>> = columns.filter_map(|c| Map::of(points, errors, rows, c)).collect();
     if maps.is_empty() {
         return note("The table varies no two settings: there is no map to draw.");
     }
     let end = maps.iter().flat_map(Map::means).fold(LEAST_END, |end, mean| end.max(mean.abs()));
-    let pairs: String = maps
-        .iter()
-        .map(|map| format!("<div class=\"maps\">{}{}</div>", map.html(false, end), map.html(true, end)))
-        .collect();
+    let pair =
+        |map: &Map<'_>| format!("<div class=\"maps\">{}{}</div>", map.html(false, end), map.html(true, end));
+    let pairs: String = maps.iter().map(pair).collect();
     let text = note(
         "Number: mean of measured less predicted relative friction in the part, positive (warm) where more friction was measured than the \
          model says, negative (cool) where less. Marks: its passes in the order of measurement, each in the colour of its own gap; click \
@@ -114,7 +103,7 @@ fn part(edges: &[f64], value: f64) -> usize {
 
 fn named(c: &Covariate, edges: &[f64], points: &Table, k: usize) -> String {
     let inside = points.passes.iter().filter_map(|p| c.of(p)).filter(|v| part(edges, *v) == k);
-    let (low, high) = inside.fold((f64::INFINITY, f64::NEG_INFINITY), |(l, h), v| (l.min(v), h.max(v)));
+    let (low, high) = ends(inside);
     let [low, high] = [low, high].map(|v| number(c.shown.0 * v));
     if low == high { low } else { format!("{low} to {high}") }
 }
@@ -161,22 +150,15 @@ impl<'a> Map<'a> {
 
     fn html(&self, after: bool, end: f64) -> String {
         let [rows, columns] = self.covariates;
-        let which = if after { "verdict's model" } else { "recalibrated baseline" };
-        let unit = |c: &Covariate| escape(&format!("{}, {}", c.words, c.shown.1));
+        let (name, which) =
+            if after { ("after", "verdict's model") } else { ("before", "recalibrated baseline") };
         let titles: String = self.titles[1].iter().map(|title| column(title)).collect();
-        let head = column(&format!("{} \\ {}", unit(rows), unit(columns))) + &titles;
-        let body: String = self
-            .cells
-            .iter()
-            .zip(&self.titles[0])
-            .map(|(row, title)| {
-                let cells: String = row.iter().map(|cell| self.cell(cell, after, end)).collect();
-                format!("<tr><th scope=\"row\">{title}</th>{cells}</tr>")
-            })
-            .collect();
-        let name = if after { "after" } else { "before" };
+        let head = column(&escape(&format!("{} \\ {}", titled(rows), titled(columns)))) + &titles;
+        let body = self.cells.iter().zip(&self.titles[0]);
+        let body =
+            body.map(|(cells, title)| row(title, cells.iter().map(|cell| self.cell(cell, after, end))));
         let label = format!("Gap {name}, left by the {which}, by {} and {}", rows.words, columns.words);
-        let text = table(&label, &head, &body);
+        let text = table(&label, &head, body);
         let caption = format!("<table class=\"map\"><caption>Gap {name}: left by the {which}</caption>");
         text.replacen("<table>", &caption, 1)
     }
@@ -186,18 +168,15 @@ impl<'a> Map<'a> {
             return "<td class=\"none\">&ndash;</td>".into();
         }
         let mean = self.mean(cell, after);
-        let marks: String = cell
-            .iter()
-            .map(|&i| {
-                let (error, point) = (self.error(i, after), self.points.points[i]);
-                // Out of the keyboard's way: the table of all passes has the same numbers.
-                format!(
-                    "<a class=\"{}\" href=\"#pass-{point}\" tabindex=\"-1\" title=\"pass {point}: {}\"></a>",
-                    shade(error, end),
-                    signed(error)
-                )
-            })
-            .collect();
+        let mark = |&i: &usize| {
+            let (error, point) = (self.error(i, after), self.points.points[i]);
+            let (shade, error) = (shade(error, end), signed(error));
+            // Out of the keyboard's way: the table of all passes has the same numbers.
+            format!(
+                "<a class=\"{shade}\" href=\"#pass-{point}\" tabindex=\"-1\" title=\"pass {point}: {error}\"></a>"
+            )
+        };
+        let marks: String = cell.iter().map(mark).collect();
         format!("<td class=\"{}\">{}<div>{marks}</div></td>", shade(mean, end), signed(mean))
     }
 }

@@ -2,17 +2,17 @@
 //! as the table has it, and by the library's law alone.
 
 use super::overlay::Overlay;
-use crate::report::html::escape;
-use crate::report::human::number;
-use crate::report::plots::Span;
+use crate::report::html::{escape, note};
+use crate::report::human::{settings, titled};
 use crate::report::plots::verdict::{LawPass, law};
+use crate::report::plots::{Span, ends};
 use crate::verdict::plain;
 use diagnosis::predict::Forecast;
 use diagnosis::verdict::Hypothesis;
 use models::condition::Condition;
 use models::covariate::{self, Covariate, Scale};
 
-const PLACES: u32 = 60;
+const PLACES: usize = 60;
 /// Share of full friction below which a law does nothing that a figure could show.
 const LEAST: f64 = 1e-4;
 
@@ -31,16 +31,14 @@ impl Overlay<'_> {
     pub fn law(&self, h: &Hypothesis) -> miette::Result<String> {
         let Some(base) = self.middle() else { return Ok(String::new()) };
         let passes = &self.table.passes;
-        let axes: Vec<(&Covariate, Vec<f64>)> = ALONG
-            .into_iter()
-            .filter_map(|c| {
-                let seen: Vec<f64> = passes.iter().map(|p| c.of(p)).collect::<Option<_>>()?;
-                let (low, high) = ends(&seen);
-                let span = Span::over([low, high].into_iter(), c.scale == Scale::Log && low > 0.0);
-                let within = |v: f64| v.clamp(low, high);
-                (high - low > 1e-3 * high.abs()).then(|| (c, span.places(PLACES).map(within).collect()))
-            })
-            .collect();
+        let axis = |c: &'static Covariate| {
+            let seen: Vec<f64> = passes.iter().map(|p| c.of(p)).collect::<Option<_>>()?;
+            let (low, high) = ends(seen);
+            let span = Span::over([low, high].into_iter(), c.scale == Scale::Log && low > 0.0);
+            let within = |v: f64| v.clamp(low, high);
+            (high - low > 1e-3 * high.abs()).then(|| (c, span.places(PLACES as u32).map(within).collect()))
+        };
+        let axes: Vec<(&Covariate, Vec<f64>)> = ALONG.into_iter().filter_map(axis).collect();
         let at = |c: &Covariate, value: f64| {
             let mut condition = base;
             c.put(&mut condition, value);
@@ -57,9 +55,7 @@ impl Overlay<'_> {
             (of(&forecasts[i]) - forecasts[i].recalibrated) / self.full(&wanted[i])
         };
         let swing = |k: usize| {
-            let all: Vec<f64> =
-                (0..PLACES as usize).map(|i| adds(k * PLACES as usize + i, |f| f.corrected)).collect();
-            let (low, high) = ends(&all);
+            let (low, high) = ends((0..PLACES).map(|i| adds(k * PLACES + i, |f| f.corrected)));
             high - low
         };
         let Some(k) = (0..axes.len()).max_by(|a, b| swing(*a).total_cmp(&swing(*b))) else {
@@ -70,46 +66,32 @@ impl Overlay<'_> {
         }
         let (along, places) = &axes[k];
         let x = |v: f64| along.shown.0 * v;
-        let curve: Vec<(f64, f64, f64)> = places
-            .iter()
-            .enumerate()
-            .map(|(i, v)| {
-                let i = k * PLACES as usize + i;
-                let sd =
-                    (forecasts[i].corrected_sd.powi(2) - forecasts[i].scatter_sd.powi(2)).max(0.0).sqrt();
-                (x(*v), adds(i, |f| f.corrected), sd / self.full(&wanted[i]).abs())
-            })
-            .collect();
-        let marks: Vec<LawPass> = (0..passes.len())
-            .filter_map(|i| {
-                let at = x(along.of(&passes[i])?);
-                let off = (self.table.lateral[i] - forecasts[curves + i].corrected) / self.full(&passes[i]);
-                Some(LawPass { x: at, y: on(&curve, at) + off, suspect: self.suspects.contains(&i) })
-            })
-            .collect();
-        let held: Vec<String> = ALONG[..4]
-            .iter()
-            .filter(|c| c.name != along.name)
-            .filter_map(|c| Some(format!("{} {}", number(c.shown.0 * c.of(&base)?), c.shown.1)))
-            .collect();
+        let of = |(i, v): (usize, &f64)| {
+            let i = k * PLACES + i;
+            let sd = (forecasts[i].corrected_sd.powi(2) - forecasts[i].scatter_sd.powi(2)).max(0.0).sqrt();
+            (x(*v), adds(i, |f| f.corrected), sd / self.full(&wanted[i]).abs())
+        };
+        let curve: Vec<(f64, f64, f64)> = places.iter().enumerate().map(of).collect();
+        let mark = |i: usize| {
+            let at = x(along.of(&passes[i])?);
+            let off = (self.table.lateral[i] - forecasts[curves + i].corrected) / self.full(&passes[i]);
+            Some(LawPass { x: at, y: on(&curve, at) + off, suspect: self.suspects.contains(&i) })
+        };
+        let marks: Vec<LawPass> = (0..passes.len()).filter_map(mark).collect();
+        let held = settings(ALONG.into_iter().take(4).filter(|c| c.name != along.name), &base);
         let name = plain(&h.effects.join(" + "));
-        let alone: Vec<(f64, f64)> = places
-            .iter()
-            .enumerate()
-            .map(|(i, v)| (x(*v), adds(k * PLACES as usize + i, |f| f.form)))
-            .collect();
+        let form = |(i, v): (usize, &f64)| (x(*v), adds(k * PLACES + i, |f| f.form));
+        let alone: Vec<(f64, f64)> = places.iter().enumerate().map(form).collect();
         let span = Span::over(curve.iter().map(|(x, ..)| *x), along.scale == Scale::Log);
-        let figure =
-            law(&name, (&format!("{}, {}", along.words, along.shown.1), span), &marks, &curve, &alone)?;
-        Ok(figure
-            + &crate::report::html::note(&format!(
+        Ok(law(&name, (&titled(along), span), &marks, &curve, &alone)?
+            + &note(&format!(
                 "What {} adds to the recalibrated baseline along the {}, at {}. Line: as the table has it, with its \
                  departure from the law; band: twice the standard deviation of its parameters and of that departure. \
                  Short dashes: the library's law alone. Discs: passes, each at the line plus what it deviates from \
                  the model, so that passes at other conditions are on the same figure.",
                 escape(&name),
                 along.words,
-                held.join(", ")
+                held
             )))
     }
 
@@ -118,22 +100,14 @@ impl Overlay<'_> {
         let driven: Vec<Condition> =
             self.table.passes.iter().filter(|p| p.amplitude.metres() > 0.0).copied().collect();
         let off = |p: &Condition| -> f64 {
-            ALONG[..4]
-                .iter()
-                .map(|c| {
-                    let all = || driven.iter().filter_map(|p| c.of(p));
-                    let of = c.of(p).unwrap_or(0.0);
-                    (all().filter(|v| *v < of).count() as f64 - all().filter(|v| *v > of).count() as f64)
-                        .abs()
-                })
-                .sum()
+            let one = |c: &&Covariate| {
+                let (of, all) = (c.of(p).unwrap_or(0.0), || driven.iter().filter_map(|p| c.of(p)));
+                (all().filter(|v| *v < of).count() as f64 - all().filter(|v| *v > of).count() as f64).abs()
+            };
+            ALONG[..4].iter().map(one).sum()
         };
         driven.iter().map(|p| (off(p), *p)).min_by(|a, b| a.0.total_cmp(&b.0)).map(|(_, p)| p)
     }
-}
-
-fn ends(values: &[f64]) -> (f64, f64) {
-    values.iter().fold((f64::INFINITY, f64::NEG_INFINITY), |(l, h), v| (l.min(*v), h.max(*v)))
 }
 
 /// A curve between its places.

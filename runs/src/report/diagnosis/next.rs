@@ -1,9 +1,10 @@
 //! What to measure next, in physical words, with the plan beside it.
 
-use crate::report::html::{column, escape, table};
-use crate::report::human::number;
+use crate::report::html::{column, escape, numeric, table};
+use crate::report::human::{number, titled};
 use diagnosis::next::{Experiment, words};
 use diagnosis::verdict::Diagnosis;
+use models::condition::Condition;
 use models::covariate::{self, Covariate};
 
 /// Nats from which odds are no longer distinguished: a million to one.
@@ -31,42 +32,22 @@ fn worth(e: &Experiment) -> String {
 fn one(e: &Experiment) -> String {
     let worth = escape(&worth(e));
     if e.conditions.is_empty() {
-        return format!(
-            "<div class=\"card\"><p><strong>{}</strong></p><p>{worth}</p></div>",
-            escape(&e.text)
-        );
+        let text = escape(&e.text);
+        return format!("<div class=\"card\"><p><strong>{text}</strong></p><p>{worth}</p></div>");
     }
     let planned: Vec<&Covariate> =
         covariate::planned().filter(|c| e.conditions.iter().any(|k| c.of(k).is_some())).collect();
-    let heads: String = planned
-        .iter()
-        .map(|c| {
-            let (_, unit) = c.shown;
-            let unit = if unit.is_empty() { String::new() } else { format!(", {unit}") };
-            column(&format!("#{}{}", escape(c.words), escape(&unit)))
-        })
-        .collect();
-    let rows: String = e
-        .conditions
-        .iter()
-        .map(|k| {
-            let cells: String = planned
-                .iter()
-                .map(|c| {
-                    c.of(k).map_or("<td class=\"n\">&ndash;</td>".into(), |v| {
-                        format!("<td class=\"n\">{}</td>", number(c.shown.0 * v))
-                    })
-                })
-                .collect();
-            format!("<tr>{cells}</tr>")
-        })
-        .collect();
+    let heads: String = planned.iter().map(|c| column(&format!("#{}", escape(&titled(c))))).collect();
+    let row = |k: &Condition| {
+        let cell = |c: &&Covariate| c.of(k).map_or("&ndash;".into(), |v| number(c.shown.0 * v));
+        format!("<tr>{}</tr>", planned.iter().map(cell).map(numeric).collect::<String>())
+    };
     format!(
         "<div class=\"card\"><p><strong>Measure these {} passes</strong>, those that tell most first. {worth}</p>{}\
          <p class=\"note\"><a download=\"next-plan.toml\" href=\"{}\">Download these passes as a plan</a>; \
          <code>muprime run next-plan.toml</code> measures them.</p></div>",
         e.conditions.len(),
-        table("Passes of the next experiment", &heads, &rows),
+        table("Passes of the next experiment", &heads, e.conditions.iter().map(row)),
         as_address(&crate::verdict::plan(e))
     )
 }

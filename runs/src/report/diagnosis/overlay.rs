@@ -1,7 +1,7 @@
 //! What was measured, and what the models say of it.
 
 use crate::report::html::note;
-use crate::report::human::number;
+use crate::report::human::{settings, titled};
 use crate::report::plots::verdict::{Seen, overlay, parity};
 use crate::report::plots::{Span, mu_axis};
 use diagnosis::data::Table;
@@ -61,13 +61,12 @@ impl<'a> Overlay<'a> {
     }
 
     fn parity(&self) -> miette::Result<String> {
-        let points: Vec<(f64, f64, f64, bool)> = (0..self.table.len())
-            .map(|i| {
-                let (full, f) = (self.full(&self.table.passes[i]), &self.forecasts[i]);
-                let [m, a, b] = [self.table.lateral[i], f.recalibrated, f.corrected].map(|n| n / full);
-                (m, a, b, self.suspects.contains(&i))
-            })
-            .collect();
+        let point = |i: usize| {
+            let (full, f) = (self.full(&self.table.passes[i]), &self.forecasts[i]);
+            let [m, a, b] = [self.table.lateral[i], f.recalibrated, f.corrected].map(|n| n / full);
+            (m, a, b, self.suspects.contains(&i))
+        };
+        let points: Vec<(f64, f64, f64, bool)> = (0..self.table.len()).map(point).collect();
         let text = note(
             "Each mark is a pass: on the line the model says what was measured. Left the recalibrated baseline, right the verdict's \
              model. Suspect passes are ringed.",
@@ -142,23 +141,16 @@ impl<'a> Overlay<'a> {
             // A base law that cannot tell leaves the curve out.
             places.iter().zip(values).map(|(x, (v, sd))| (*x, v, sd)).filter(|p| p.1.is_finite()).collect()
         };
-        let points: Vec<Seen> = rows
-            .iter()
-            .map(|&i| Seen {
-                x: shown(i),
-                before: self.table.lateral[i] / self.full(&passes[i]),
-                after: self.result.fitted.problem.whole_variance(i).sqrt() / self.full(&passes[i]).abs(),
-                suspect: self.suspects.contains(&i),
-            })
-            .collect();
-        let base: Vec<String> = others
-            .iter()
-            .filter_map(|c| Some(format!("{} {}", number(c.shown.0 * c.of(&typical)?), c.shown.1)))
-            .collect();
-        let title = base.join(", ");
+        let point = |&i: &usize| Seen {
+            x: shown(i),
+            before: self.table.lateral[i] / self.full(&passes[i]),
+            after: self.result.fitted.problem.whole_variance(i).sqrt() / self.full(&passes[i]).abs(),
+            suspect: self.suspects.contains(&i),
+        };
+        let points: Vec<Seen> = rows.iter().map(point).collect();
         overlay(
-            &title,
-            (&format!("{}, {}", x.words, x.shown.1), span),
+            &settings(others.iter().copied(), &typical),
+            (&titled(x), span),
             &points,
             &of(|f| f.recalibrated),
             &of(|f| f.corrected),

@@ -2,6 +2,7 @@
 
 use super::overlay::Overlay;
 use crate::report::html::{column, columns, table};
+use crate::report::human::titled;
 use diagnosis::data::Table;
 use diagnosis::predict::Forecast;
 use models::covariate::{self, Covariate};
@@ -18,10 +19,7 @@ const SETTINGS: [(&Covariate, usize); 5] = [
 
 /// The section. A link to a row opens it.
 pub fn section(points: &Table, overlay: &Overlay<'_>, forecasts: &[Forecast]) -> String {
-    let settings = SETTINGS.iter().map(|(c, _)| match c.shown.1 {
-        "" => column(c.words),
-        unit => column(&format!("{}, {unit}", c.words)),
-    });
+    let settings = SETTINGS.iter().map(|(c, _)| column(&titled(c)));
     let values = columns("\u{3bc}' measured|baseline|model|gap before|gap after");
     let head = [column("pass"), settings.collect(), values].concat();
     let mut rows = String::new();
@@ -42,6 +40,6 @@ pub fn section(points: &Table, overlay: &Overlay<'_>, forecasts: &[Forecast]) ->
             "<td>{measured:.3}</td><td>{baseline:.3}</td><td>{model:.3}</td><td>{before:+.3}</td><td>{after:+.3}</td></tr>"
         );
     }
-    let all = table("All passes", &head, &rows).replacen("<table>", "<table class=\"nums\">", 1);
+    let all = table("All passes", &head, [rows]).replacen("<table>", "<table class=\"nums\">", 1);
     format!("<details><summary>All {} passes</summary>{all}</details>", points.len())
 }

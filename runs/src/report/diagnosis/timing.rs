@@ -1,27 +1,20 @@
 //! What the edges in the run's record say of time: a sentence, the mean edge, and the numbers.
 
-use crate::report::html::{columns, escape, note, table};
+use crate::report::html::{columns, escape, note, numeric, row, table};
 use crate::report::human::number;
 use crate::report::plots::verdict::edge;
-use diagnosis::timing::{Comparison, Form, title};
+use diagnosis::describe::probability;
+use diagnosis::timing::{Comparison, Form, FormNote, title};
 use diagnosis::verdict::Diagnosis;
 
 /// The section; empty for a table without a record.
 pub fn section(result: &Diagnosis) -> miette::Result<String> {
     let Some(record) = &result.report.record else { return Ok(String::new()) };
     let mut text = String::from("<h2>Does the force come in time?</h2>");
-    let stated = record.stated_passband_hz.map_or_else(
-        || {
-            "The profile of the force sensor states no passband (passband_hz): its whole delay is found."
-                .to_string()
-        },
-        |hz| {
-            format!(
-                "The profile of the force sensor states a passband of {} Hz; its delay is taken off.",
-                number(hz)
-            )
-        },
-    );
+    let states = match record.stated_passband_hz.map(number) {
+        None => "no passband (passband_hz): its whole delay is found.".to_string(),
+        Some(hz) => format!("a passband of {hz} Hz; its delay is taken off."),
+    };
     for c in &record.comparisons {
         text += &format!("<p>{}.</p>", escape(&c.text));
     }
@@ -34,28 +27,17 @@ pub fn section(result: &Diagnosis) -> miette::Result<String> {
     text += &format!("<div class=\"panels\">{}</div>", figures?.concat());
     text += &note(&format!(
         "Mean of the edges, as a share of the change of force. Points: measured. Dashes: expected of a channel in time. \
-         Line: with what was found. {stated}"
+         Line: with what was found. The profile of the force sensor states {states}"
     ));
     let head = columns("form of lateness|#probability|#mean delay, ms|#sd, ms");
     for c in judged {
-        let rows: String = c
-            .forms
-            .iter()
-            .map(|f| {
-                let [late, sd] = [f.late_s, f.sd_s].map(|s| format!("{:.2}", 1e3 * s));
-                format!(
-                    "<tr><th scope=\"row\">{}</th><td class=\"n\">{}</td><td class=\"n\">{late}</td><td class=\"n\">{sd}</td></tr>",
-                    form(f.form),
-                    diagnosis::describe::probability(f.probability)
-                )
-            })
-            .collect();
+        let row = |f: &FormNote| {
+            let [late, sd] = [f.late_s, f.sd_s].map(|s| format!("{:.2}", 1e3 * s));
+            row(form(f.form), [probability(f.probability), late, sd].map(numeric))
+        };
         let label = format!("Forms of lateness: {}", title(c.against));
-        text += &format!(
-            "<details><summary>{}</summary>{}</details>",
-            escape(&label),
-            table(&label, &head, &rows)
-        );
+        let forms = table(&label, &head, c.forms.iter().map(row));
+        text += &format!("<details><summary>{}</summary>{forms}</details>", escape(&label));
     }
     Ok(text)
 }

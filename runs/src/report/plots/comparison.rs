@@ -13,11 +13,10 @@ pub fn overlay(result: &Comparison) -> miette::Result<String> {
     let widest = widest(result);
     let means = || result.pairs.iter().flat_map(|p| [p.a, p.b]);
     let mu = mu_axis(means().flat_map(|m| [m.mu_relative - m.sd, m.mu_relative + m.sd]));
+    let [one, other] = [0, 1].map(mark_name);
     let alt = format!(
-        "Relative friction of two runs against amplitude, {} conditions in common: {} the first, {} the second.",
-        result.pairs.len(),
-        mark_name(0),
-        mark_name(1)
+        "Relative friction of two runs against amplitude, {} conditions in common: {one} the first, {other} the second.",
+        result.pairs.len()
     );
     let x = (Span::linear(0.0..widest), AMPLITUDE);
     // A little beside each other, so that no mark hides the other one.
@@ -33,10 +32,9 @@ pub fn overlay(result: &Comparison) -> miette::Result<String> {
         measured(chart, 1, size, COLOURS[1], &result.pairs.iter().map(second).collect::<Vec<_>>(), mu)
     })?;
     Ok(format!(
-        "<figure>{svg}<figcaption>{}: the first run; {}: the second, joined to the first at the same condition. Bars: one standard \
+        "<figure>{svg}<figcaption>{}: the first run; {other}: the second, joined to the first at the same condition. Bars: one standard \
          uncertainty from pass to pass. All speeds, frequencies and loads that both have.{}</figcaption></figure>",
-        capital(mark_name(0)),
-        mark_name(1),
+        capital(one),
         beyond(means().map(|m| m.mu_relative), mu)
     ))
 }

@@ -5,9 +5,6 @@ use crate::fidelity::{Group, Place};
 use crate::report::human::number;
 
 /// Wanted and measured `mu'` over position, one direction of one group.
-///
-/// # Errors
-/// Only if the drawing library fails.
 pub fn over_position(places: &[Place], what: &str) -> miette::Result<String> {
     let of =
         |mu: fn(&Place) -> f64| -> Vec<(f64, f64)> { places.iter().map(|p| (p.x_m * 1e3, mu(p))).collect() };
@@ -25,9 +22,6 @@ pub fn over_position(places: &[Place], what: &str) -> miette::Result<String> {
 }
 
 /// Gain from wanted to measured `mu'` against temporal frequency, a mark a group, beside the known dynamics.
-///
-/// # Errors
-/// Only if the drawing library fails.
 pub fn transfer(groups: &[Group]) -> miette::Result<String> {
     let bins = || groups.iter().flat_map(|g| &g.transfer);
     let places = Span::over(bins().map(|b| b.hz), true);

@@ -7,7 +7,7 @@ use super::{
 };
 use crate::report::RunData;
 use crate::report::html::escape;
-use crate::report::human::number;
+use crate::report::human::{number, settings};
 use crate::report::levels::{FORCE, FREQUENCY, Levels, SPEED};
 use crate::report::published::Published;
 use crate::sequence::MeasuredPass;
@@ -59,12 +59,9 @@ static AXES: [Axis; 4] = [
 pub fn panels(run: &RunData, all: &[Published]) -> miette::Result<String> {
     let passes: Vec<_> = run.passes.iter().map(|p| p.pass.clone()).collect();
     let mu0 = models::pass::coulomb_coefficient(&passes);
-    let driven: Vec<(&MeasuredPass, Condition)> = run
-        .passes
-        .iter()
-        .filter(|p| {
-            p.pass.amplitude > PeakToPeak::ZERO && p.comparison.is_some_and(|c| c.mu_relative.is_some())
-        })
+    let compared = run.passes.iter().filter(|p| p.comparison.is_some_and(|c| c.mu_relative.is_some()));
+    let driven: Vec<(&MeasuredPass, Condition)> = compared
+        .filter(|p| p.pass.amplitude > PeakToPeak::ZERO)
         .map(|p| (p, p.pass.condition(mu0.unwrap_or(f64::NAN))))
         .collect();
     if driven.is_empty() {
@@ -101,13 +98,11 @@ fn panel(
     let scale = axis.covariate.shown.0;
     let chosen = along(driven, k);
     let base = chosen[chosen.len() / 2].1;
-    let own: Vec<(f64, f64, f64)> = chosen
-        .iter()
-        .filter_map(|(p, c)| {
-            let found = p.comparison?;
-            Some((scale * axis.of(c), found.mu_relative?, found.mu_relative_sd.unwrap_or(0.0)))
-        })
-        .collect();
+    let own = |(p, c): &(&MeasuredPass, Condition)| {
+        let found = p.comparison?;
+        Some((scale * axis.of(c), found.mu_relative?, found.mu_relative_sd.unwrap_or(0.0)))
+    };
+    let own: Vec<(f64, f64, f64)> = chosen.iter().filter_map(own).collect();
     let laws: Vec<&Published> = all.iter().filter(|p| p.psi_star.is_some() && mu0.is_some()).collect();
     let values: Vec<(&Published, f64, f64)> =
         all.iter().filter_map(|p| Some((p, scale * (axis.published)(p)?, p.mu_relative?))).collect();
@@ -121,12 +116,10 @@ fn panel(
             sources.push(p.named());
         }
     }
+    let [passes, published, lines] = [own.len(), values.len(), laws.len()];
     let alt = format!(
-        "Relative friction against {}: {} passes of this run, {} published values and {} laws.",
-        axis.title,
-        own.len(),
-        values.len(),
-        laws.len()
+        "Relative friction against {}: {passes} passes of this run, {published} published values and {lines} laws.",
+        axis.title
     );
     // Alike in every other setting that the source states.
     let alike = |p: &Published| {
@@ -150,15 +143,13 @@ fn panel(
             }
         }
         for law in &laws {
-            let places: Vec<(f64, PsiEq17)> = span
-                .places(PLACES)
-                .filter_map(|x| {
-                    let mut c = base;
-                    axis.covariate.put(&mut c, x / scale);
-                    let shown = !law.of_paper || within_fitted_range(&c);
-                    shown.then(|| (x, PsiEq17::at(&c, run.finger.poisson_ratio)))
-                })
-                .collect();
+            let place = |x: f64| {
+                let mut c = base;
+                axis.covariate.put(&mut c, x / scale);
+                let shown = !law.of_paper || within_fitted_range(&c);
+                shown.then(|| (x, PsiEq17::at(&c, run.finger.poisson_ratio)))
+            };
+            let places: Vec<(f64, PsiEq17)> = span.places(PLACES).filter_map(place).collect();
             let star = law.psi_star.unwrap_or(f64::NAN);
             let curve = |star: f64| -> Vec<(f64, f64)> {
                 places.iter().map(|(x, psi)| (*x, cut(relative_friction(*psi, star)))).collect()
@@ -179,14 +170,8 @@ fn panel(
         }
         Ok(())
     })?;
-    let held: Vec<String> = AXES
-        .iter()
-        .enumerate()
-        .filter(|(i, _)| *i != k)
-        .map(|(_, a)| (a.of(&base), a.covariate.shown))
-        .map(|(value, (scale, unit))| format!("{} {unit}", number(scale * value)))
-        .collect();
-    let mut words = format!("Discs: {} passes of this run at {}.", own.len(), held.join(", "));
+    let others = AXES.iter().map(|a| a.covariate).filter(|c| c.name != axis.covariate.name);
+    let mut words = format!("Discs: {} passes of this run at {}.", own.len(), settings(others, &base));
     for (i, source) in sources.iter().enumerate() {
         words += &format!(" {}: {source}.", capital(mark_name((1 + i) % 5)));
     }

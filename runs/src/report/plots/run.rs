@@ -134,23 +134,17 @@ pub fn mu_against_psi(run: &RunData) -> miette::Result<String> {
 
 /// How far each pass lies from what was expected after those before it, in the order of measurement.
 pub fn residuals(run: &RunData) -> miette::Result<String> {
-    let points: Vec<(f64, f64, bool)> = run
-        .passes
-        .iter()
-        .filter_map(|p| Some((p.pass.time_s, p.comparison?.z, p.reference)))
-        .filter(|(_, z, _)| z.is_finite())
-        .collect();
+    let judged = run.passes.iter().filter_map(|p| Some((p.pass.time_s, p.comparison?.z, p.reference)));
+    let points: Vec<(f64, f64, bool)> = judged.filter(|(_, z, _)| z.is_finite()).collect();
     if points.is_empty() {
         return Ok("<p>No pass was judged.</p>".into());
     }
     let end = points.iter().map(|p| p.0).fold(1.0, f64::max) * 1.02;
     let worst = points.iter().map(|p| p.1.abs()).fold(0.0, f64::max);
     let most = worst.clamp(3.0, 40.0) * 1.1;
-    let alt = format!(
-        "Surprise of {} passes against time, the largest of {} standard deviations.",
-        points.len(),
-        number(worst)
-    );
+    let (passes, largest) = (points.len(), number(worst));
+    let alt =
+        format!("Surprise of {passes} passes against time, the largest of {largest} standard deviations.");
     let (x, y) = (Span::linear(0.0..end), Span::linear(-most..most));
     let (x, y) = ((x, "time, s"), (y, "surprise, standard deviations"));
     let svg = figure((WIDE.0, 340), x, y, &alt, |chart, size| {
@@ -171,12 +165,8 @@ pub fn residuals(run: &RunData) -> miette::Result<String> {
 
 /// Histogram of the loop's lateness.
 pub fn lateness(report: &LoopReport) -> miette::Result<String> {
-    let bars: Vec<(f64, f64)> = report
-        .histogram
-        .iter()
-        .filter(|(_, n)| *n > 0)
-        .map(|(ns, n)| (*ns as f64 / 1e3, *n as f64))
-        .collect();
+    let filled = report.histogram.iter().filter(|(_, n)| *n > 0);
+    let bars: Vec<(f64, f64)> = filled.map(|(ns, n)| (*ns as f64 / 1e3, *n as f64)).collect();
     if bars.is_empty() {
         return Ok("<p>No cycle was timed.</p>".into());
     }

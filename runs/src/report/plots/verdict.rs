@@ -1,7 +1,10 @@
 //! The figures of a verdict.
 
-use super::{COLOURS, GREY, PANEL, Span, band, beyond, draw, edge_of, figure, line, mark, mu_axis, mu_on};
+use super::{
+    COLOURS, GREY, PANEL, Span, band, beyond, draw, edge_of, figure, line, mark, measured, mu_axis, mu_on,
+};
 use crate::report::html::escape;
+use crate::report::human::titled;
 use models::covariate::{Covariate, Scale};
 use plotters::prelude::*;
 
@@ -41,12 +44,8 @@ pub fn overlay(
         band(chart, &edge(-2.0), &edge(2.0), COLOURS[0])?;
         line(chart, baseline.iter().map(|(x, m, _)| (*x, cut(*m))).collect(), COLOURS[1], Some(6))?;
         line(chart, edge(0.0), COLOURS[0], None)?;
-        let bars = points.iter().map(|p| {
-            let ends = [(p.x, cut(p.before - p.after)), (p.x, cut(p.before + p.after))];
-            PathElement::new(ends.to_vec(), BLACK.stroke_width(1))
-        });
-        draw(chart, bars)?;
-        draw(chart, points.iter().map(|p| mark(0, (p.x, cut(p.before)), size - 1, BLACK, true)))?;
+        let seen: Vec<_> = points.iter().map(|p| (p.x, p.before, p.after)).collect();
+        measured(chart, 0, size - 1, BLACK, &seen, axis)?;
         rings(chart, points.iter().filter(|p| p.suspect).map(|p| (p.x, cut(p.before))), size)
     })?;
     let cut = beyond(points.iter().map(|p| p.before), axis);
@@ -132,9 +131,7 @@ pub fn parity(points: &[(f64, f64, f64, bool)]) -> miette::Result<String> {
 
 /// Errors of passes in standard deviations against one covariate: hollow before a cause was added, filled after.
 pub fn errors_against(c: &Covariate, limit: f64, points: &[Seen]) -> miette::Result<String> {
-    let unit = c.shown.1;
-    // A direction has no unit.
-    let name = if unit.is_empty() { c.words.to_string() } else { format!("{}, {unit}", c.words) };
+    let name = titled(c);
     let alt = format!("Errors of {} passes against {}, before and after.", points.len(), c.words);
     let x = Span::over(points.iter().map(|p| p.x), c.scale == Scale::Log);
     let y = (Span::linear(-limit..limit), "error, sd");

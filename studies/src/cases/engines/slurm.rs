@@ -82,10 +82,8 @@ fn array_of(job: &Job) -> u64 {
     (job.window / 2).clamp(1, ARRAY)
 }
 
-/// Hands arrays over while the window has room beside what is `queued` and the site takes them.
-///
-/// # Errors
-/// A refusal that does not pass by itself, or one that lasts.
+/// Hands arrays over while the window has room beside what is `queued` and the site takes them; fails at a
+/// refusal that does not pass by itself, or one that lasts.
 fn more(folder: &Path, job: &Job, handed: &mut Handed, mut queued: u64) -> miette::Result<()> {
     let tasks = (job.ranges.len() as u64).div_ceil(job.cores_a_task);
     while handed.tasks < tasks && handed.pause_until.is_none_or(|until| Instant::now() >= until) {

@@ -1,6 +1,6 @@
 //! One sealed set a case, made, diagnosed and scored: case `i` is the `i`th set that `muprime blind --seed SEED` scores.
 
-use super::{Case, CaseKind, document, flag, joined, no_lines, number, settings, text};
+use super::{Case, CaseKind, document, flag, no_lines, number, settings, text, word};
 use crate::cases::{file::Header, run::here};
 pub use crate::validation::blind::Settings;
 use crate::validation::blind::{Scored, score, set};
@@ -36,14 +36,11 @@ fn prepare(header: &Header, _: &std::path::Path) -> miette::Result<super::Make> 
         let run = move || {
             let scored = score(&set(settings.seed, index, settings.stratum), &options)
                 .map_err(|why| format!("{why:#}"))?;
-            let word = |v: serde_json::Result<serde_json::Value>| {
-                v.map(|v| v.as_str().unwrap_or_default().to_string()).map_err(|e| e.to_string())
-            };
             Ok(vec![
-                word(serde_json::to_value(scored.stratum))?.into(),
-                joined(&scored.truth).into(),
-                word(serde_json::to_value(scored.verdict))?.into(),
-                joined(&scored.named).into(),
+                word(scored.stratum)?.into(),
+                scored.truth.join("+").into(),
+                word(scored.verdict)?.into(),
+                scored.named.join("+").into(),
                 scored.probability_of_truth.into(),
                 scored.top_probability.into(),
                 scored.top_right.into(),

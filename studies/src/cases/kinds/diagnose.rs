@@ -1,6 +1,6 @@
 //! The diagnosis of one table a case: a laboratory's archive. The key holds the contents of table and rig.toml, not their names.
 
-use super::{Case, CaseKind, Cell, count, joined, line, number, text};
+use super::{Case, CaseKind, Cell, count, line, number, text, word};
 use crate::cases::file::Header;
 use calibration::certificate::sha256_hex;
 use diagnosis::document::document;
@@ -88,18 +88,13 @@ fn prepare(header: &Header, folder: &Path) -> miette::Result<super::Make> {
             let passes = parse_passes(&table_path, &bytes)
                 .map_err(|why| plain(why).replace(&table_path.display().to_string(), "table"))?;
             let subject = Subject::of(passes, &bytes, rig).map_err(|why| why.to_string())?;
-            let options = Options {
-                pairs: !settings.no_pairs,
-                without: settings.without.clone(),
-                own,
-                ..Options::default()
-            };
+            let (pairs, without) = (!settings.no_pairs, settings.without.clone());
+            let options = Options { pairs, without, own, ..Options::default() };
             let result = subject.diagnose(options, None).map_err(plain)?;
             let first = result.report.hypotheses.first();
-            let verdict = serde_json::to_value(result.report.verdict).map_err(|e| e.to_string())?;
             Ok(vec![
-                verdict.as_str().map(str::to_string).into(),
-                first.map(|h| joined(&h.effects)).into(),
+                word(result.report.verdict)?.into(),
+                first.map(|h| h.effects.join("+")).into(),
                 first.map(|h| h.probability).into(),
                 result.report.gap.shrinkage.into(),
                 result.report.gap.unexplained_share.into(),

@@ -1,6 +1,6 @@
 //! One scene of the fault bench a case: case `i` is the seed `first + i`.
 
-use super::{Case, CaseKind, Cell, count, document, no_lines, settings, text};
+use super::{Case, CaseKind, Cell, count, document, no_lines, settings, text, word};
 use crate::cases::{file::Header, run::here};
 use crate::validation::faults::search::{judged, scene_of};
 use crate::validation::faults::{Found, Pace, ROWS, Tally};
@@ -54,16 +54,13 @@ fn prepare(header: &Header, _: &std::path::Path) -> miette::Result<super::Make> 
         let run = move || {
             let scene = scene_of(seed, pairs, pace);
             let found = judged(&scene, twice);
-            let struck: Vec<String> = scene.strikes.iter().map(|s| ROWS[s.row].name.to_string()).collect();
-            let moment = serde_json::to_value(scene.moment).map_err(|e| e.to_string())?;
+            let struck: Vec<&str> = scene.strikes.iter().map(|s| ROWS[s.row].name).collect();
             let whole = serde_json::to_string(&found).map_err(|e| e.to_string())?;
-            let trip = found.trip.map(|trip| serde_json::to_value(trip.cause).map_err(|e| e.to_string()));
-            let plain = |v: serde_json::Value| v.as_str().map_or_else(|| v.to_string(), str::to_string);
             Ok(vec![
                 seed.into(),
-                plain(moment).into(),
-                super::joined(&struck).into(),
-                trip.transpose()?.map(plain).into(),
+                word(scene.moment)?.into(),
+                struck.join("+").into(),
+                found.trip.map(|trip| word(trip.cause)).transpose()?.into(),
                 found.cycles.into(),
                 found.command_off.iter().flatten().max().copied().into(),
                 found.measured_off.into(),

@@ -186,9 +186,8 @@ fn prepare(header: &Header, _: &std::path::Path) -> miette::Result<super::Make> 
     if header.listed != settings.spans.is_empty() {
         miette::bail!("ridge cases are either listed or drawn from `spans`");
     }
-    let [corneum, dermis, soft] = base.materials();
     base.check().into_diagnostic()?;
-    base.geometry.mesh(corneum, dermis, soft, base.elements).into_diagnostic()?;
+    base.geometry.mesh(base.materials(), base.elements).into_diagnostic()?;
     for (name, span) in &settings.spans {
         if !(span.low < span.high && (!span.log || span.low > 0.0)) {
             miette::bail!(

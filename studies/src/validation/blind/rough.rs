@@ -44,8 +44,27 @@ pub struct Answers {
 impl Answers {
     /// The answer on one set.
     fn of(noise: &str, truth: &str, set: &RoughSet, report: &Report) -> Self {
-        let mut one = Answers { noise: noise.into(), truth: truth.into(), ..Answers::default() };
-        one.count(set, report);
+        let leads = &report.hypotheses[0].effects;
+        let bad = |point: &u64| set.bad.contains(point);
+        let found = report.scatter.suspects.iter().filter(|s| bad(&s.point)).count();
+        let mut one = Answers {
+            noise: noise.into(),
+            truth: truth.into(),
+            sets: 1,
+            bad: set.bad.len(),
+            found,
+            good: set.passes.len() - set.bad.len(),
+            falsely: report.scatter.suspects.len() - found,
+            ..Answers::default()
+        };
+        match report.verdict {
+            Verdict::Named if *leads == [truth] => one.right = 1,
+            Verdict::Named => one.wrong = 1,
+            Verdict::Ambiguous => one.ambiguous = 1,
+            Verdict::Unknown => one.unknown = 1,
+            Verdict::NoGap if truth == "none" => one.right = 1,
+            Verdict::NoGap => one.missed = 1,
+        }
         one
     }
 
@@ -78,26 +97,6 @@ impl Answers {
             }
         }
         rows
-    }
-
-    fn count(&mut self, set: &RoughSet, report: &Report) {
-        let leads = &report.hypotheses[0].effects;
-        let none = self.truth == "none";
-        self.sets += 1;
-        match report.verdict {
-            Verdict::Named if *leads == [self.truth.clone()] => self.right += 1,
-            Verdict::Named => self.wrong += 1,
-            Verdict::Ambiguous => self.ambiguous += 1,
-            Verdict::Unknown => self.unknown += 1,
-            Verdict::NoGap if none => self.right += 1,
-            Verdict::NoGap => self.missed += 1,
-        }
-        let bad = |point: &u64| set.bad.contains(point);
-        let suspects = report.scatter.suspects.iter().filter(|s| bad(&s.point)).count();
-        self.bad += set.bad.len();
-        self.found += suspects;
-        self.good += set.passes.len() - set.bad.len();
-        self.falsely += report.scatter.suspects.len() - suspects;
     }
 }
 

@@ -137,11 +137,8 @@ impl Scene {
             What::Channel(target, mode, strength, ms) => {
                 let timing = self.pace.timing(T, RING);
                 let age = timing.amplifier.age_limit().0.max(timing.normal.age_limit().0);
-                let strength = if mode == FaultMode::Delayed && strength == TOO_LATE {
-                    Nanos(age + 11 * T.0).seconds()
-                } else {
-                    strength
-                };
+                let too_late = mode == FaultMode::Delayed && strength == TOO_LATE;
+                let strength = if too_late { Nanos(age + 11 * T.0).seconds() } else { strength };
                 Some(Fault { target, mode, from: time_of(s.at), until: time_of(s.at + ms), strength })
             }
             _ => None,
@@ -149,7 +146,7 @@ impl Scene {
         self.strikes.iter().filter_map(fault).collect()
     }
 
-    fn tampers(&self) -> Option<(super::tamper::Tamper, Nanos)> {
+    fn tampers(&self) -> Option<(Tamper, Nanos)> {
         self.strikes.iter().find_map(|s| match ROWS[s.row].what {
             What::Shown(tamper) => Some((tamper, time_of(s.at))),
             _ => None,
@@ -199,8 +196,7 @@ impl Scene {
     fn length(&self) -> u64 {
         let longest = |s: &Strike| {
             s.at + match ROWS[s.row].expect {
-                Expect::Off(within) => within.at(&self.pace.timing(T, RING)),
-                Expect::Remark(within) => within.at(&self.pace.timing(T, RING)),
+                Expect::Off(within) | Expect::Remark(within) => within.at(&self.pace.timing(T, RING)),
                 Expect::RemarkOrOff(n) => n,
                 Expect::NoTrip | Expect::NoMu => 100,
             }
@@ -242,7 +238,7 @@ impl Scene {
     fn hands(&self, cycle: u64, world: &SharedRig) {
         for strike in self.strikes.iter().filter(|s| s.at == cycle) {
             let mut rig = world.rig();
-            let mut operator = rig.world().operator();
+            let mut operator = rig.world().operator;
             match ROWS[strike.row].what {
                 What::DeadMan => operator.holds_dead_man_from = None,
                 What::EmergencyStop => operator.presses_emergency_stop = true,
@@ -250,7 +246,7 @@ impl Scene {
                 What::RelayFalls => rig.world_mut().cut_supply(),
                 _ => {}
             }
-            rig.world_mut().set_operator(operator);
+            rig.world_mut().operator = operator;
         }
     }
 
@@ -291,7 +287,7 @@ pub fn run_with(scene: &Scene, keep: bool, core: Core) -> Found {
     let tamper = scene.tampers().filter(|_| !deaf);
     let tampered = |inner| Tampered::new(inner, tamper, &shown);
     let holds_dead_man_from = Some(time_of(20));
-    world.rig().world_mut().set_operator(Operator { holds_dead_man_from, ..Operator::default() });
+    world.rig().world_mut().operator = Operator { holds_dead_man_from, ..Operator::default() };
     let (supply, contacts) = (world.clone(), world.clone());
     let ports = Ports::new(
         Box::new(FaultyForce::new(tampered(force), &faults, scene.seed)),
@@ -324,9 +320,7 @@ pub fn run_with(scene: &Scene, keep: bool, core: Core) -> Found {
             paused = ms;
             lateness = time_of(ms);
         }
-        let asleep =
-            core == Core::Sleeps && scene.strikes.iter().any(|s| (s.at..s.at + 1000).contains(&cycle));
-        if asleep {
+        if core == Core::Sleeps && scene.strikes.iter().any(|s| (s.at..s.at + 1000).contains(&cycle)) {
             continue;
         }
         if deaf {

@@ -124,26 +124,6 @@ const fn cycles(cycles: u64) -> Within {
 }
 
 impl Within {
-    const fn force_ages(self, force_ages: u64) -> Self {
-        Within { force_ages, ..self }
-    }
-
-    const fn state_ages(self, state_ages: u64) -> Self {
-        Within { state_ages, ..self }
-    }
-
-    const fn responses(self, responses: u64) -> Self {
-        Within { responses, ..self }
-    }
-
-    const fn or_by_loss(self) -> Self {
-        Within { by_loss: true, ..self }
-    }
-
-    const fn or_by_ramp(self) -> Self {
-        Within { by_ramp: true, ..self }
-    }
-
     /// In cycles, at that timing.
     pub fn at(&self, timing: &Timing) -> u64 {
         let whole = |t: Nanos| t.0.div_ceil(timing.cycle.0);
@@ -227,9 +207,9 @@ use Target as T;
 use What::{Channel, Late, Paused, Shown};
 
 rows! {
-    1 "forces_silent" ALL Channel(T::Force, F::Off, 0.0, ON) => Off(cycles(1).force_ages(1)), LateralStale | NormalStale;
-    1 "lateral_silent" ALL Channel(T::Lateral, F::Off, 0.0, ON) => Off(cycles(1).force_ages(1)), LateralStale;
-    1 "normal_silent" ALL Channel(T::Normal, F::Off, 0.0, ON) => Off(cycles(1).force_ages(1)), NormalStale;
+    1 "forces_silent" ALL Channel(T::Force, F::Off, 0.0, ON) => Off(Within { force_ages: 1, ..cycles(1) }), LateralStale | NormalStale;
+    1 "lateral_silent" ALL Channel(T::Lateral, F::Off, 0.0, ON) => Off(Within { force_ages: 1, ..cycles(1) }), LateralStale;
+    1 "normal_silent" ALL Channel(T::Normal, F::Off, 0.0, ON) => Off(Within { force_ages: 1, ..cycles(1) }), NormalStale;
     2 "forces_stuck" ALL Channel(T::Force, F::Stuck, 0.0, ON) => Off(cycles(FROZEN + 1)), LateralFrozen | NormalFrozen;
     2 "normal_stuck" ALL Channel(T::Normal, F::Stuck, 0.0, ON) => Off(cycles(FROZEN + 1)), NormalFrozen;
     2 "amplitude_stuck" STEADY Shown(Tamper::AmplitudeStuck) => Off(cycles(AMPLITUDE_FROZEN + 2)), AmplitudeFrozen;
@@ -250,7 +230,7 @@ rows! {
     7 "amplifier_garbage" DRIVEN Channel(T::Amplifier, F::Garbage, 0.0, ON) => Off(cycles(4)), OverAmplitude | AmplitudeRunaway | AmplitudeRate | AmplifierFault | EchoMismatch | OverTemperature | DriveNoResponse;
     7 "stage_garbage" ALL Channel(T::Stage, F::Garbage, 0.0, ON) => Off(cycles(4)), StageFault | OverTravel | StageNotFollowing;
     8 "forces_at_half_rate" ALL Channel(T::Force, F::Slow, 2.0, ON) => Remark(cycles(LOSS));
-    8 "forces_at_a_twentieth" ALL Channel(T::Force, F::Slow, 20.0, ON) => Off(cycles(2).force_ages(2).or_by_loss()), LateralStale | NormalStale | LateralLossy | NormalLossy;
+    8 "forces_at_a_twentieth" ALL Channel(T::Force, F::Slow, 20.0, ON) => Off(Within { force_ages: 2, by_loss: true, ..cycles(2) }), LateralStale | NormalStale | LateralLossy | NormalLossy;
     9 "forces_delayed" ALL Channel(T::Force, F::Delayed, TOO_LATE, ON) => Off(cycles(1)), LateralStale | NormalStale;
     9 "amplifier_delayed" ALL Channel(T::Amplifier, F::Delayed, TOO_LATE, ON) => Off(cycles(1)), AmplifierStale;
     9 "stage_delayed" ALL Channel(T::Stage, F::Delayed, TOO_LATE, ON) => Off(cycles(1)), StageStale;
@@ -261,7 +241,7 @@ rows! {
     11 "stage_disconnected" ALL Channel(T::Stage, F::Disconnected, 0.0, ON) => Off(cycles(1)), StageStale;
     14 "answers_corrupt" ALL Channel(T::Force, F::Corrupt, 0.0, ON) => Off(cycles(4)), LateralInvalid | NormalInvalid;
     18 "samples_out_of_order" ALL Channel(T::Force, F::Disordered, 0.0, ON) => RemarkOrOff(LOSS), LateralStale | NormalStale | LateralLossy | NormalLossy;
-    20 "drive_commands_late" DRIVEN Channel(T::Drive, F::Delayed, 0.03, ON) => Off(cycles(50).state_ages(1)), AmplifierWatchdog | EchoMismatch | DriveNoResponse;
+    20 "drive_commands_late" DRIVEN Channel(T::Drive, F::Delayed, 0.03, ON) => Off(Within { state_ages: 1, ..cycles(50) }), AmplifierWatchdog | EchoMismatch | DriveNoResponse;
     22 "device_clock_back" ALL Channel(T::Force, F::ClockJump, -1.0, ON) => Off(cycles(1)), LateralStale | NormalStale;
     22 "device_clock_ahead" ALL Channel(T::Force, F::ClockJump, 1.0, ON) => Off(cycles(4)), LateralInvalid | NormalInvalid;
     22 "amplifier_clock_ahead" ALL Channel(T::Amplifier, F::ClockJump, 1.0, ON) => Off(cycles(1)), AmplifierStale;
@@ -272,13 +252,13 @@ rows! {
     24 "one_in_fifty_late" ALL Late { cycles: 40, every: 50, tenths: 15 } => Off(cycles(560)), Overrun;
     29 "stop_asked_for" ALL What::Stop => Off(cycles(1)), Stopped;
     31 "amplifier_refuses_off" DRIVEN What::StopRefused => Off(cycles(1)), Stopped;
-    32 "amplifier_link_cut" DRIVEN Channel(T::Drive, F::Off, 0.0, ON) => Off(cycles(50).state_ages(1)), AmplifierWatchdog | EchoMismatch | DriveNoResponse;
-    32 "amplifier_states_silent" ALL Channel(T::Amplifier, F::Off, 0.0, ON) => Off(cycles(1).state_ages(1)), AmplifierStale;
+    32 "amplifier_link_cut" DRIVEN Channel(T::Drive, F::Off, 0.0, ON) => Off(Within { state_ages: 1, ..cycles(50) }), AmplifierWatchdog | EchoMismatch | DriveNoResponse;
+    32 "amplifier_states_silent" ALL Channel(T::Amplifier, F::Off, 0.0, ON) => Off(Within { state_ages: 1, ..cycles(1) }), AmplifierStale;
     33 "amplitude_times_ten" DRIVEN Shown(Tamper::AmplitudeTimes(10.0)) => Off(cycles(2)), OverAmplitude | AmplitudeRunaway;
     33 "amplitude_times_two" DRIVEN Shown(Tamper::AmplitudeTimes(2.0)) => Off(cycles(2)), AmplitudeRunaway | AmplitudeRate | OverAmplitude;
-    34 "amplitude_sensor_zero" DRIVEN Shown(Tamper::AmplitudeTimes(0.0)) => Off(cycles(56).responses(1).or_by_ramp()), DriveNoResponse;
-    34 "amplitude_sensor_lost" DRIVEN Shown(Tamper::AmplitudeLost) => Off(cycles(56).responses(1).or_by_ramp()), DriveNoResponse;
-    35 "resonance_lost" DRIVEN Shown(Tamper::AmplitudeTimes(0.5)) => Remark(cycles(71).responses(1).or_by_ramp());
+    34 "amplitude_sensor_zero" DRIVEN Shown(Tamper::AmplitudeTimes(0.0)) => Off(Within { responses: 1, by_ramp: true, ..cycles(56) }), DriveNoResponse;
+    34 "amplitude_sensor_lost" DRIVEN Shown(Tamper::AmplitudeLost) => Off(Within { responses: 1, by_ramp: true, ..cycles(56) }), DriveNoResponse;
+    35 "resonance_lost" DRIVEN Shown(Tamper::AmplitudeTimes(0.5)) => Remark(Within { responses: 1, by_ramp: true, ..cycles(71) });
     36 "normal_overforce_step" ALL Shown(Tamper::NormalStep(3.0)) => Off(cycles(2)), NormalOverforce;
     36 "lateral_overforce_step" ALL Shown(Tamper::LateralStep(-4.0)) => Off(cycles(2)), LateralOverforce;
     36 "normal_overforce_creeps" ALL Shown(Tamper::NormalRamp(20.0)) => Off(cycles(1)), NormalOverforce;
@@ -289,17 +269,17 @@ rows! {
     37 "amplifier_watchdog_fired" DRIVEN Shown(Tamper::WatchdogFired) => Off(cycles(1)), AmplifierWatchdog;
     38 "over_travel" ALL Shown(Tamper::OverTravel) => Off(cycles(1)), OverTravel;
     38 "end_switch" ALL Channel(T::Stage, F::Saturated, 0.0, ON) => Off(cycles(1)), OverTravel;
-    38 "stage_stalls" MOVING What::StageStalls => Off(cycles(0).state_ages(1)), StageNotFollowing;
+    38 "stage_stalls" MOVING What::StageStalls => Off(Within { state_ages: 1, ..cycles(0) }), StageNotFollowing;
     38 "stage_runs_away" ALL Shown(Tamper::StageFast) => Off(cycles(2)), StageNotFollowing;
-    38 "stage_states_silent" ALL Channel(T::Stage, F::Off, 0.0, ON) => Off(cycles(1).state_ages(1)), StageStale;
+    38 "stage_states_silent" ALL Channel(T::Stage, F::Off, 0.0, ON) => Off(Within { state_ages: 1, ..cycles(1) }), StageStale;
     39 "contact_lost" DRIVEN Shown(Tamper::ContactLost) => NoMu;
     40 "dead_man_released" ALL What::DeadMan => Off(cycles(1)), DeadMan;
     40 "exposure_too_long" DRIVEN What::Exposure => Off(cycles(2)), Exposure;
     43 "model_diverges" ALL What::ModelDiverges => NoTrip;
     47 "request_beyond_limits" ALL What::Request => Off(cycles(1)), RequestRefused;
-    48 "rogue_master" DRIVEN What::RogueMaster => Off(cycles(2).responses(1).state_ages(1).or_by_ramp()), EchoMismatch | DriveNoResponse | AmplitudeRunaway;
+    48 "rogue_master" DRIVEN What::RogueMaster => Off(Within { responses: 1, state_ages: 1, by_ramp: true, ..cycles(2) }), EchoMismatch | DriveNoResponse | AmplitudeRunaway;
     48 "amplifier_echo_stuck_when_idle" STILL Channel(T::Amplifier, F::Stuck, 0.0, ON) => NoTrip;
     51 "emergency_stop_pressed" ALL What::EmergencyStop => Off(cycles(1)), EmergencyStop;
     51 "guard_opened" ALL What::Guard => Off(cycles(1)), Interlock;
-    52 "relay_falls_open" ALL What::RelayFalls => Off(cycles(2).state_ages(1)), AmplifierFault | SupplySwitch | AmplifierStale;
+    52 "relay_falls_open" ALL What::RelayFalls => Off(Within { state_ages: 1, ..cycles(2) }), AmplifierFault | SupplySwitch | AmplifierStale;
 }

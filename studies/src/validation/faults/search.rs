@@ -129,20 +129,13 @@ pub fn judged(scene: &Scene, twice: bool) -> Found {
 
 /// Makes a failing scene small: without one of its faults, then with every fault as early as it can strike.
 fn smallest(scene: &Scene, twice: bool, wrong: Vec<String>) -> (Scene, Vec<String>) {
-    let mut best = (scene.clone(), wrong);
-    let mut tries = Vec::new();
-    for i in 0..scene.strikes.len() {
+    let without = |i: usize| {
         let mut fewer = scene.clone();
         fewer.strikes.remove(i);
-        tries.push(fewer);
-    }
-    for candidate in tries {
-        let found = judged(&candidate, twice);
-        if !found.wrong.is_empty() {
-            best = (candidate, found.wrong);
-            break;
-        }
-    }
+        let wrong = judged(&fewer, twice).wrong;
+        (!wrong.is_empty()).then_some((fewer, wrong))
+    };
+    let best = (0..scene.strikes.len()).find_map(without).unwrap_or_else(|| (scene.clone(), wrong));
     let mut early = best.0.clone();
     for strike in &mut early.strikes {
         strike.at = STEADY_AT;

@@ -5,25 +5,24 @@ use super::{Map, Taken, unit_row};
 use crate::import::clock::is_time;
 use crate::import::grid::{Cell, Grid, Row};
 use crate::import::guess::{open_unit, stroke, unit_of};
-use crate::import::targets::{ColumnKind, Id, TARGETS};
+use crate::import::targets::Id;
 use crate::import::units::Unit;
 
 /// Why columns with a name of that column of the point table were not guessed.
 pub(super) fn open(map: &Map, grid: &Grid, column: &str) -> String {
     let why = |k: usize| {
-        let (target, unit) = open_unit(grid, k).filter(|(target, _)| TARGETS[*target].column == column)?;
-        let (name, header) = (TARGETS[target].name, &grid.header[k]);
+        let (target, unit) = open_unit(grid, k).filter(|(target, _)| target.column == column)?;
+        let (name, header) = (target.name, &grid.header[k]);
         Some(format!("; '{header}' was left open: '{unit}' is not a unit of {name} that a header can state"))
     };
-    let free = (0..grid.header.len()).filter(|k| !map.columns.iter().any(|c| c.index == *k));
-    free.filter_map(why).collect()
+    map.free(grid).filter_map(why).collect()
 }
 
 /// The refusal of a magnitude that has both signs in many rows: it would turn with the direction twice.
 pub(super) fn signed(column: &Taken, grid: &Grid) -> Option<String> {
-    let remedy = match column.target {
-        t if t == Id::FrictionForce as usize => "map it as lateral_force",
-        t if t == Id::FrictionCoefficient as usize => {
+    let remedy = match column.target.id {
+        Id::FrictionForce => "map it as lateral_force",
+        Id::FrictionCoefficient => {
             "map its product with the normal force as lateral_force (under a constant load of 5 N: HEADER=lateral_force:5N)"
         }
         _ => return None,
@@ -34,7 +33,7 @@ pub(super) fn signed(column: &Taken, grid: &Grid) -> Option<String> {
     };
     let values: Vec<f64> = grid.rows.iter().filter_map(value).filter(|v| *v != 0.0).collect();
     let below = values.iter().filter(|v| **v < 0.0).count();
-    let (few, name) = (below.min(values.len() - below), TARGETS[column.target].name);
+    let (few, name) = (below.min(values.len() - below), column.target.name);
     (few > 0 && 5 * few >= values.len()).then(|| {
         format!(
             "{}: {below} of {} values are negative, and {name} is a magnitude without a sign: if the sign is that of the sensor, {remedy}",
@@ -55,27 +54,26 @@ pub fn contradicted(map: &Map, grid: &Grid) -> Vec<String> {
     };
     let counted = |c: &Taken| {
         let row = || unit_row(&grid.units, c.index).and_then(stroke);
-        let says = stroke(&grid.header[c.index]).or_else(row)? as usize;
-        let other = says != c.target && TARGETS[c.target].column == Id::AmplitudePp.target().column;
-        let (says, taken) = (TARGETS[says].name, TARGETS[c.target].name);
+        let says = stroke(&grid.header[c.index]).or_else(row)?.target();
+        let other = says.id != c.target.id && says.column == c.target.column;
+        let (says, taken) = (says.name, c.target.name);
         other.then(|| format!("{}: the header says {says}, the map says {taken}; {words}", c.header))
     };
     let assumed = |c: &Taken| {
         // A clock's times have their unit.
         let clock = grid.rows.iter().any(|r| grid.cell(r, c.index).is_some_and(is_time));
-        let number = matches!(TARGETS[c.target].kind, ColumnKind::Number(_)) && !clock;
-        (c.assumed && number).then(|| format!("{}: no unit stated, {} assumed", c.header, c.unit_text))
+        (c.assumed && c.target.dimension().is_some() && !clock)
+            .then(|| format!("{}: no unit stated, {} assumed", c.header, c.unit_text))
     };
-    let of_column =
-        |c: &Taken| [unit(c), counted(c), assumed(c), nameless(c, grid)].into_iter().flatten().collect();
-    map.columns.iter().flat_map(|c| -> Vec<String> { of_column(c) }).collect()
+    let of_column = |c: &Taken| [unit(c), counted(c), assumed(c), nameless(c, grid)].into_iter().flatten();
+    map.columns.iter().flat_map(of_column).collect()
 }
 
 /// Rows without the name of a run, where others have one.
 fn nameless(column: &Taken, grid: &Grid) -> Option<String> {
     let rows: Vec<&Row> = grid.rows.iter().filter(|r| r.block == 0).collect();
     let bare = |r: &&&Row| grid.cell(r, column.index).is_none_or(|cell| *cell == Cell::Empty);
-    let first = rows.iter().find(bare).filter(|_| column.target == Id::Run as usize)?;
+    let first = rows.iter().find(bare).filter(|_| column.target.id == Id::Run)?;
     let count = rows.iter().filter(bare).count();
     (count < rows.len()).then(|| {
         format!(

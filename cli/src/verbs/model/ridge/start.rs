@@ -54,9 +54,6 @@ pub fn is_lightly_damped(case: &RidgeCase) -> bool {
 }
 
 /// Runs a case down from twice its amplitude and compares it with the run from rest.
-///
-/// # Errors
-/// As [`ridge::run`].
 pub fn from_above(
     case: &RidgeCase,
     settings: &RunSettings,
