@@ -34,6 +34,15 @@ struct Truth {
     hidden: Vec<Hidden>,
     #[serde(default)]
     noise_free: Vec<NoiseFree>,
+    #[serde(default)]
+    stranger: Option<Stranger>,
+}
+
+/// What a cause outside the library looks like.
+#[derive(Deserialize)]
+struct Stranger {
+    structure: String,
+    covariate: String,
 }
 
 #[derive(Deserialize)]
@@ -67,6 +76,8 @@ struct Line {
     claimed_ci95: Option<[f64; 2]>,
     structure: Option<String>,
     description: Vec<String>,
+    /// Of a stranger: whether the first structure that the verdict describes is the true one.
+    described: Option<bool>,
     seconds: f64,
     passes: usize,
     gap_chi2: f64,
@@ -178,6 +189,12 @@ fn score(folder: &Path, options: &Options, changes: &[Constants]) -> Result<Line
                 )
             })
             .collect(),
+        described: truth.stranger.map(|s| {
+            let first = report.description.first();
+            first.is_some_and(|d| {
+                d.covariate == s.covariate && serde_json::json!(d.structure) == s.structure.as_str()
+            })
+        }),
         seconds,
         passes: fitted.problem.len(),
         gap_chi2: fitted.problem.misfit(&fitted.none.prediction),
@@ -317,6 +334,13 @@ fn summary(lines: &[Line]) -> String {
         count(&stranger, &is("named")),
         count(&stranger, &is("no_gap")),
         log(&stranger)
+    );
+    let seen: Vec<&&Judged<'_>> = stranger.iter().filter(|j| j.line.detectable).collect();
+    let unknown = seen.iter().filter(|j| j.line.verdict == "unknown").count();
+    let described = seen.iter().filter(|j| j.line.described == Some(true)).count();
+    text += &format!(
+        "detectable strangers: {}, unknown {unknown}, of these first described right {described}\n",
+        seen.len()
     );
     text += &format!("none: no gap {}, log score {:.2}\n", count(&none, &is("no_gap")), log(&none));
     text += &format!("0.99 and more is right: {} of {}\n", sure.iter().sum::<f64>(), sure.len());

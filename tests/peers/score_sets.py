@@ -107,10 +107,8 @@ def figures(sets):
     shown = [s for s in strangers if s["detectable"]]
     say("strangers: named", share(strangers, lambda s: s["verdict"] == "named"))
     say("detectable strangers: unknown", share(shown, lambda s: s["verdict"] == "unknown"))
-    kinds = [s for s in shown if s["structure"][0] in ("jump", "bump", "period")]
-    unknown = [s for s in kinds if s["verdict"] == "unknown"]
-    say("jumps, bumps, periods: unknown, and first described right", share(kinds,
-                                                            lambda s: s["description"][:1] == [s["structure"]]))
+    unknown = [s for s in shown if s["verdict"] == "unknown"]
+    say("detectable strangers: unknown, and first described right", share(shown, lambda s: s["description"][:1] == [s["structure"]]))
     say("  of those unknown: first described right", share(unknown, lambda s: s["description"][:1] == [s["structure"]]))
     say("  of those unknown: right among all described", share(unknown, lambda s: s["structure"] in s["description"]))
     clear = [s for s in pairs if s["detectable"] and min(s["alone"]) >= 30]
