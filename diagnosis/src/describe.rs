@@ -109,7 +109,7 @@ pub fn description(fitted: &Fitted, decision: &Decision) -> Vec<Description> {
     };
     // One that acts on friction in several ways is one structure: the best of them is described.
     let mut seen: Vec<Description> = Vec::new();
-    for described in fitted.shapes.iter().map(of).take_while(|d| d.log10_odds_vs_no_gap > LEAST_ODDS) {
+    for described in fitted.shapes.iter().map(of).filter(|d| d.log10_odds_vs_no_gap > LEAST_ODDS) {
         let again =
             |d: &Description| (d.structure, d.covariate) == (described.structure, described.covariate);
         if seen.len() < MOST && !seen.iter().any(again) {

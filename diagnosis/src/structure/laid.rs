@@ -73,6 +73,9 @@ mod tests {
         // A cause in a form that nobody has fitted would look alike: causes keep a share.
         assert!((0.5..0.9).contains(&result.report.hypotheses[0].probability), "{}", result.report.text);
         assert_eq!(result.report.description[0].covariate, "time_s");
+        // The jump fits as a change of the coefficient and of the reading: it is one structure all the same.
+        let described = || result.report.description.iter().map(|d| (d.structure, d.covariate));
+        assert!(described().enumerate().all(|(i, d)| described().skip(i + 1).all(|other| other != d)));
         assert!(result.report.text.contains("with the first shape described"), "{}", result.report.text);
         let held = whole.select(&held);
         let mut errors = [0.0; 2];

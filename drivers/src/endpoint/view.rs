@@ -34,7 +34,7 @@ impl View<'_> {
         self.flag(signal) || self.fault().is_some_and(|fault| fault.severity == Severity::Stop)
     }
 
-    /// Whether the signal stands in this frame.
+    /// Whether the signal is in this frame.
     pub fn holds(&self, signal: SignalId) -> bool {
         self.profile.frame_of(signal) == self.frame
     }

@@ -393,7 +393,7 @@ impl Compiler<'_> {
         }
         let text_answer = frame.text.is_some();
         if text_answer && (s.has_place() || s.bits.is_some()) {
-            let has = "stands in a line of text: it has no register, byte, type or bits";
+            let has = "is in a line of text: it has no register, byte, type or bits";
             return Err(wrong(format!("signal `{name}` {has}")));
         }
         if let Some(Form::Pattern(pattern)) = &frame.text {

@@ -42,7 +42,7 @@ const COMMANDED: &[(Role, &[&str])] = &[
 const FASTEST_HZ: f64 = 20_000.0;
 
 impl Compiler<'_> {
-    /// Refuses what stands in a section.
+    /// Refuses a section, or what is in it.
     fn refuse(&self, section: &str, why: impl ToString) -> Result<(), ProfileError> {
         Err(self.at_text(section, why))
     }

@@ -100,7 +100,7 @@ impl Row {
         self.cells.iter().filter(|c| **c != Cell::Empty).count()
     }
 
-    /// What stands in its cells up to the last that holds something.
+    /// Its cells up to the last that holds something.
     pub fn texts(&self) -> Vec<String> {
         self.cells[..self.width()].iter().map(Cell::shown).collect()
     }

@@ -1,4 +1,4 @@
-//! Symbols of units: those that are read, and those that may stand in a row of units.
+//! Symbols of units: those that are read, and those that a row of units may have.
 
 use super::{Dimension, Unit};
 use std::f64::consts::PI;
@@ -34,7 +34,7 @@ pub const UNITS: &[(Dimension, &[&str], Unit)] = &[
 ];
 const GRAM_FORCE: Unit = Unit::times(980_665.0, -8);
 
-/// Symbols of units, of quantities that no target has among them, and words that stand in their place.
+/// Symbols of units, of quantities that no target has among them, and words that replace them.
 const SYMBOLS: &[&str] = &[
     "m", "s", "g", "N", "Pa", "V", "A", "J", "W", "K", "C", "ohm", "\u{3a9}", "\u{2126}", "Hz", "rad", "deg",
     "°", "°C", "°F", "degC", "degF", "%", "min", "h", "hr", "sec", "rpm", "rev", "revs", "cycle", "cycles",
@@ -45,7 +45,7 @@ const SYMBOLS: &[&str] = &[
     "h:mm:ss", "x",
 ];
 
-/// Whether a text can stand in a row of units: symbols of any quantity, with prefixes, exponents, products and quotients.
+/// Whether a text can be in a row of units: symbols of any quantity, with prefixes, exponents, products and quotients.
 pub fn is_unit(text: &str) -> bool {
     let text = text.trim().trim_matches(['[', ']', '(', ')']).trim();
     let symbol =
