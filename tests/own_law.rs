@@ -574,6 +574,7 @@ fn an_effect_of_ones_own_is_one_more_hypothesis() {
 
     for (name, text, part) in [
         ("squeeze_film", dip_table(1e-4, 1.0), "is an effect of the library"),
+        ("unknown", dip_table(1e-4, 1.0), "is an answer of a verdict"),
         ("Film", dip_table(1e-4, 1.0), "is not a name of an effect"),
         ("film", "speed_m_s,mu_relative\n0.1,1\n".into(), "an effect table has no column 'mu_relative'"),
         ("film", "speed_m_s\n0.1\n".into(), "'friction_change' is missing"),

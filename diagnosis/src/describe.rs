@@ -1,4 +1,4 @@
-//! What an unknown departure looks like: a jump, bump, period, resonance, rough function or memory, with its
+//! What an unknown departure looks like: a jump, bump, period, resonance, rough function, memory or trend, with its
 //! place, size and odds; and which causes are sure though others act beside them. docs/diagnosis/model.md, section 10.
 
 use crate::decision::{Decision, Verdict};
@@ -19,7 +19,8 @@ pub struct Description {
     /// The covariate over which it is.
     pub covariate: &'static str,
     /// Place of a jump, bump or resonance, length of a period or within which a rough function changes, in
-    /// the covariate's unit. Of a memory the mean from which it counts, or its reach over the position.
+    /// the covariate's unit. Of a trend where half of it is made up. Of a memory the mean from which it
+    /// counts, or its reach over the position.
     pub at: f64,
     /// Its 95 % interval.
     pub at_ci95: [f64; 2],
@@ -59,7 +60,7 @@ pub fn probability(p: f64) -> String {
 }
 
 /// A number with three significant digits.
-fn three_digits(value: f64) -> String {
+pub(crate) fn three_digits(value: f64) -> String {
     let scale = 10f64.powi(2 - value.abs().max(1e-300).log10().floor() as i32);
     format!("{}", (value * scale).round() / scale)
 }
@@ -78,6 +79,7 @@ fn words(shape: &Shape) -> String {
         ShapeKind::Rough => {
             format!("a rough function of {over}, which changes within {at} {unit} {interval},")
         }
+        ShapeKind::Trend => format!("a trend over {over}, half of it by {at} {unit} {interval},"),
         ShapeKind::Memory => format!("a memory of the {over} of the pass before"),
     };
     let of = if shape.turns { "friction" } else { "the lateral reading, alike in both directions" };
@@ -109,7 +111,8 @@ pub fn description(fitted: &Fitted, decision: &Decision) -> Vec<Description> {
     };
     // One that acts on friction in several ways is one structure: the best of them is described.
     let mut seen: Vec<Description> = Vec::new();
-    for described in fitted.shapes.iter().map(of).filter(|d| d.log10_odds_vs_no_gap > LEAST_ODDS) {
+    let clear = |shape: &&Shape| shape.stands_out / base10 > LEAST_ODDS;
+    for described in fitted.shapes.iter().filter(clear).map(of) {
         let again =
             |d: &Description| (d.structure, d.covariate) == (described.structure, described.covariate);
         if seen.len() < MOST && !seen.iter().any(again) {

@@ -2,8 +2,10 @@
 
 use crate::certificates::{AtFault, InDoubt, at_fault, in_doubt};
 use crate::data::Table;
+use crate::describe::three_digits;
 use crate::unstated::Unstated;
 use crate::verdict::{Diagnosis, Report};
+use models::covariate::{COVARIATES, Covariate, Role};
 use models::rig_file::RigFile;
 use serde::Serialize;
 
@@ -51,4 +53,46 @@ pub fn predictions(result: &Diagnosis, conditions: &Table) -> Result<String, Uns
         text.push_str(&format!("{point},{cells}\n"));
     }
     Ok(text)
+}
+
+/// Share of a range beyond which a setting is outside it.
+const BEYOND: f64 = 0.1;
+
+/// Says which settings of the conditions lie outside those of the table: nothing was seen there.
+pub fn outside(table: &Table, conditions: &Table) -> Option<String> {
+    let range = |c: &Covariate, of: &Table| {
+        let seen = of.passes.iter().filter_map(|p| c.of(p));
+        seen.fold(None, |r: Option<[f64; 2]>, v| Some(r.map_or([v, v], |[a, b]| [a.min(v), b.max(v)])))
+    };
+    let beyond = COVARIATES.iter().filter(|c| c.role != Role::Time).filter_map(|c| {
+        let ([low, high], [least, most]) = (range(c, table)?, range(c, conditions)?);
+        let room = BEYOND * (high - low).max(high.abs());
+        let (factor, unit) = c.shown;
+        let shown = |v: f64| three_digits(v * factor);
+        (least < low - room || most > high + room).then(|| {
+            let [low, high, least, most] = [low, high, least, most].map(shown);
+            format!("{} {least} to {most} {unit} (table: {low} to {high})", c.words)
+        })
+    });
+    let all: Vec<String> = beyond.collect();
+    (!all.is_empty()).then(|| {
+        format!("Conditions to predict lie outside the table, where no pass was seen: {}.", all.join("; "))
+    })
+}
+
+#[cfg(test)]
+mod tests {
+    use super::outside;
+    use crate::example::{Deviates, table};
+
+    /// Conditions of the table are within it; a speed of ten times the largest is outside, and is said so.
+    #[test]
+    fn a_speed_beyond_the_table_is_remarked() {
+        let table = table(&mut Deviates(5), 0.0);
+        let mut conditions = table.clone();
+        assert_eq!(outside(&table, &conditions), None);
+        conditions.passes[3].speed_m_s = 0.9;
+        let remark = outside(&table, &conditions).unwrap();
+        assert!(remark.contains("speed 10 to 900 mm/s (table: 10 to 90)"), "{remark}");
+    }
 }

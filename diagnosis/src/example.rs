@@ -74,3 +74,18 @@ pub fn table(draw: &mut Deviates, exponent: f64) -> Table {
         .collect();
     Table { points: (0..36).collect(), passes, lateral, runs: vec![0; 36], run_count: 1, design }
 }
+
+/// So many of such tables, one after the other, each a run.
+pub fn runs(draw: &mut Deviates, count: usize) -> Table {
+    let mut all = table(draw, 0.0);
+    let (own, length) = (all.len(), all.design.duration_s);
+    for run in 1..count {
+        let mut next = table(draw, 0.0);
+        next.passes.iter_mut().for_each(|p| p.time_s += run as f64 * length);
+        all.passes.append(&mut next.passes);
+        all.lateral.append(&mut next.lateral);
+    }
+    let design = Design { duration_s: count as f64 * length, ..all.design };
+    let runs = (0..all.passes.len()).map(|i| i / own).collect();
+    Table { points: (0..all.passes.len() as u64).collect(), runs, run_count: count, design, ..all }
+}

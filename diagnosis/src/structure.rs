@@ -9,6 +9,7 @@
 mod axis;
 mod factor;
 mod form;
+mod ground;
 pub mod laid;
 mod places;
 pub mod shapes;

@@ -132,6 +132,15 @@ fn a_jump_is_no_cause_whose_function_bends_to_it() {
     assert_ne!(verdict, Verdict::Named, "{text}");
 }
 
+/// A lateral gain that falls by a tenth in the session, at two loads (a massless slider in Python, no code of the
+/// library): nearly a load offset that falls as well, which was the likeliest answer.
+#[test]
+fn a_drifting_gain_is_no_offset_of_the_load() {
+    let (verdict, text, effects) = diagnosed("gain_drift");
+    assert_eq!((verdict, effects), (Verdict::Unknown, vec!["unknown".to_string()]), "{text}");
+    assert!(text.contains("gain drift"), "{text}");
+}
+
 /// Menisci pull by the humidity: a condition that does not state one is refused, with the law and the column.
 #[test]
 fn a_law_of_humidity_predicts_no_condition_without_one() {

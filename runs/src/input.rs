@@ -51,10 +51,19 @@ impl BadInput {
 
 /// Everything that is wrong with one file.
 #[derive(Debug, thiserror::Error, Diagnostic)]
-#[error("{} problems: {}", .all.len(), .all.iter().map(ToString::to_string).collect::<Vec<_>>().join("; "))]
+#[error("{} problems: {}", .all.len(), first_of(.all))]
 pub struct Several {
     #[related]
     all: Vec<BadInput>,
+}
+
+/// The first three problems, and how many there are besides.
+fn first_of(all: &[BadInput]) -> String {
+    let mut list: Vec<String> = all.iter().take(3).map(ToString::to_string).collect();
+    if all.len() > list.len() {
+        list.push(format!("and {} more", all.len() - list.len()));
+    }
+    list.join("; ")
 }
 
 /// Problems of one file as they are found: all are reported at once.

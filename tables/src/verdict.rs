@@ -1,5 +1,6 @@
 //! From a table and the rig.toml beside it to a verdict, its page, and the files in a run's folder.
 
+use crate::import::remarks_of;
 use crate::law::Loaded;
 use crate::passes::parse_passes;
 use calibration::certificate::sha256_hex;
@@ -16,6 +17,9 @@ use runs::run_dir::{damage_in, is_held, record_facts};
 use runs::verdict::{add_record, files};
 use std::path::{Path, PathBuf};
 use std::sync::Arc;
+
+/// Most points that a remark lists.
+const LISTED: usize = 8;
 
 /// The point table of `data`, a table or a run's folder, and the rig.toml: `rig`, or the one beside it.
 pub fn inputs(data: &Path, rig: Option<PathBuf>) -> (PathBuf, PathBuf) {
@@ -65,7 +69,23 @@ impl Subject {
         let options = Options { law: self.law.clone(), ..options };
         let mut result = diagnose(&self.table, &self.rig, &options, self.sha256.clone());
         run.map_or(Ok(()), |run| add_record(&mut result, run, &self.rig))?;
+        result.report.remarks.extend(self.unused());
+        result.report.remarks.extend(remarks_of(&self.passes));
         Ok(result)
+    }
+
+    /// Says which passes have no lateral force.
+    fn unused(&self) -> Option<String> {
+        let without = self.passes.iter().filter(|p| p.lateral_force_n.is_none());
+        let points: Vec<String> = without.map(|p| p.point.to_string()).collect();
+        let shown = points[..points.len().min(LISTED)].join(", ");
+        let more = if points.len() > LISTED { ", ..." } else { "" };
+        (!points.is_empty()).then(|| {
+            format!(
+                "Without lateral_force_n, and so not used: {} passes (points {shown}{more}).",
+                points.len()
+            )
+        })
     }
 
     /// The page of a verdict on a run's folder.

@@ -2,7 +2,7 @@
 
 use super::prelude::*;
 use diagnosis::data::Table;
-use diagnosis::document::{document, predictions};
+use diagnosis::document::{document, outside, predictions};
 use diagnosis::hypotheses::Options;
 use diagnosis::progress::{Progress, Stage};
 use diagnosis::verdict::Diagnosis;
@@ -80,16 +80,13 @@ pub fn run(args: Args, json: bool) -> miette::Result<ExitCode> {
         miette::bail!(help = "give the folder of a run", "--in-folder: {} is a table", args.data.display());
     }
     let (subject, damage) = read(&inputs, args.model.as_deref())?;
-    if run.is_none() && !json {
-        let remarks = tables::import::remarks_of(&subject.passes);
-        remarks.iter().for_each(|r| say!("{}", folded(&format!("warning: {r}"), 4)));
-    }
     let options = options(&args)?;
     let conditions = args.predict.as_ref().map(|path| conditions(path, &subject)).transpose()?;
     places(&args)?;
     let bar = studies::progress::bar(1000, "per mille");
     let progress = follow(&bar, json)?;
-    let result = subject.diagnose(Options { progress, ..options }, run)?;
+    let mut result = subject.diagnose(Options { progress, ..options }, run)?;
+    result.report.remarks.extend(conditions.as_ref().and_then(|c| outside(&subject.table, c)));
     bar.finish_and_clear();
     if let (Some(conditions), Some(out)) = (&conditions, &args.predictions) {
         let shown = || args.predict.as_ref().map_or_else(String::new, |path| path.display().to_string());

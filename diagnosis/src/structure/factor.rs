@@ -1,8 +1,5 @@
 //! Bayes factors of the columns of a shape, averaged over sizes.
 
-use super::form::Way;
-use crate::evidence::Posterior;
-use crate::fit::Problem;
 use crate::gaussian::{Covariance, Scaled, log_sum_exp};
 use nalgebra::{DMatrix, DVector};
 
@@ -55,22 +52,4 @@ pub(super) fn factor_of(
         Factor { nats: 0.5 * (parts.explained - parts.log_det), mean, sd, size }
     });
     averaged(each)
-}
-
-/// Log evidence over no gap's of more scatter, in proportion to friction.
-pub(super) fn white(
-    part: &Problem,
-    jacobian: &DMatrix<f64>,
-    residual: &DVector<f64>,
-    none: &Posterior,
-    prediction: &DVector<f64>,
-) -> f64 {
-    let signal = Way::Friction.signal(part, &none.u, prediction);
-    let evidence = |size: f64| {
-        let variance = part.variance.iter().zip(signal.iter()).map(|(v, s)| v + (size * s).powi(2)).collect();
-        let c = Problem { variance, ..part.clone() }.covariance(jacobian);
-        -0.5 * (c.quadratic(residual) + c.log_det())
-    };
-    let each = SIZES.map(|size| evidence(size) - evidence(0.0));
-    log_sum_exp(&each) - (SIZES.len() as f64).ln()
 }

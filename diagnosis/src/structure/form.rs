@@ -1,6 +1,7 @@
 //! What a shape is made of: its form over a covariate, and what it is in proportion to.
 
 use super::axis::Axis;
+use super::ground::Under;
 use crate::constants::Constants;
 use crate::discrepancy::scale;
 use crate::fit::Problem;
@@ -23,6 +24,8 @@ pub(super) enum Form {
     Through(f64, f64, f64),
     /// Along from here, in this unit.
     Along(f64, f64),
+    /// From 0 to 1 over a range from here on, by a power.
+    Over(f64, f64, f64),
     /// Within this of nought.
     Within(f64),
     /// Any function with this correlation length.
@@ -45,6 +48,7 @@ impl Form {
                 of(&|x| (phase.cos() + 2.0 * phase.sin() * z(x)) / (1.0 + z(x).powi(2)))
             }
             Form::Along(from, unit) => of(&|x| (x - from) / unit),
+            Form::Over(low, range, power) => of(&|x| ((x - low) / range).clamp(0.0, 1.0).powf(*power)),
             Form::Within(reach) => of(&|x| (-x / reach).exp()),
             Form::Any(kernel, length) => {
                 let places: Vec<_> =
@@ -101,8 +105,8 @@ pub(super) struct Placement {
     pub(super) way: Way,
     /// Deviation of its size, in units of the way.
     pub(super) sd: f64,
-    /// Scale of independent scatter, and how many columns of what lasts it stands for; none as settled.
-    pub(super) alone: Option<(f64, usize)>,
+    /// The scatter under which it fits best.
+    pub(super) under: Under,
 }
 
 impl Placement {

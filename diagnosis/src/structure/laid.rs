@@ -1,6 +1,6 @@
 //! A shape beside the recalibrated baseline, fitted to some passes: what it predicts at others.
 
-use super::shapes::{Shape, independent};
+use super::shapes::Shape;
 use crate::evidence::Posterior;
 use crate::fit::Problem;
 use crate::gaussian::Covariance;
@@ -32,11 +32,8 @@ impl Laid {
         let centre = none.u[..NUISANCES].to_vec();
         let (prediction, columns) = columns(shape, problem, &centre);
         let pull = columns.columns(0, NUISANCES) * DVector::from_column_slice(&centre);
-        let residual = DVector::from_column_slice(&problem.lateral) - prediction + pull;
-        let covariance = match shape.best.alone {
-            Some((scale, lasting)) => independent(problem, scale, lasting).covariance(&columns),
-            None => problem.covariance(&columns),
-        };
+        let residual = DVector::from_column_slice(&problem.lateral) - &prediction + pull;
+        let covariance = shape.best.under.problem(problem, &centre, &prediction).covariance(&columns);
         let weights = covariance.weights(&residual).rows(0, columns.ncols()).into_owned();
         Laid { shape: shape.clone(), centre, covariance, weights }
     }

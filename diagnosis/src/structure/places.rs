@@ -23,6 +23,9 @@ const PHASES: [f64; 4] = [0.0, 0.125, 0.25, 0.375];
 const SEEN: [f64; 3] = [0.25 * PI, 0.5 * PI, 0.75 * PI];
 /// Correlation lengths of a rough function, as shares of the range.
 const ROUGH: [f64; 2] = [0.04, 0.1];
+/// Levels of a covariate from which there may be a trend, and the powers of its distance from the low end.
+const TREND_LEVELS: usize = 3;
+const POWERS: [f64; 5] = [0.25, 0.5, 1.0, 2.0, 4.0];
 /// Distances, as shares of the stroke, within which the place of the pass before counts.
 const REACHES: [f64; 3] = [0.05, 0.15, 0.4];
 
@@ -46,7 +49,7 @@ pub(super) fn placed(part: &Problem, past: &Arc<Past>) -> Vec<(ShapeKind, Axis, 
     own.chain(histories).filter(|(_, _, places)| !places.is_empty()).collect()
 }
 
-/// The shapes that a covariate may have: none where it has few levels, for there a jump is a law.
+/// The shapes that a covariate may have: a trend alone where it has few levels, for there a jump is a law.
 fn over(axis: &Axis, part: &Problem, x: &[f64], values: &[f64]) -> Vec<(ShapeKind, Vec<Placed>)> {
     let covariate = axis.covariate;
     let mut order: Vec<usize> = (0..x.len()).collect();
@@ -55,8 +58,15 @@ fn over(axis: &Axis, part: &Problem, x: &[f64], values: &[f64]) -> Vec<(ShapeKin
     let range = x[last] - x[first];
     let unit = (values[last] - values[first]) / range;
     let levels = 1 + order.windows(2).filter(|w| x[w[1]] - x[w[0]] > 1e-3 * range).count();
-    if range.is_nan() || range <= covariate.least_spread || levels < LEVELS {
+    if range.is_nan() || range <= covariate.least_spread || levels < TREND_LEVELS {
         return Vec::new();
+    }
+    // Half of a trend is made up where its power is one half.
+    let half =
+        |power: f64| order[order.partition_point(|&i| (x[i] - x[first]) / range < 0.5f64.powf(1.0 / power))];
+    let trends = POWERS.map(|power| (values[half(power)], Form::Over(x[first], range, power))).to_vec();
+    if levels < LEVELS {
+        return vec![(ShapeKind::Trend, trends)];
     }
     let seen: Vec<Option<f64>> = x.iter().copied().map(Some).collect();
     let weight = |form: &Form| form.columns(&seen).iter().map(|v| v.abs()).sum::<f64>();
@@ -78,7 +88,7 @@ fn over(axis: &Axis, part: &Problem, x: &[f64], values: &[f64]) -> Vec<(ShapeKin
     spots.retain(|(row, width)| enough(&about(*row, *width)));
     let peak = |(row, width): &(usize, f64)| (values[*row], Form::Through(x[*row], *width, 0.0));
     let bumps = spots.iter().map(|(row, width)| about(*row, *width)).chain(spots.iter().map(peak)).collect();
-    let mut all = vec![(ShapeKind::Jump, jumps), (ShapeKind::Bump, bumps)];
+    let mut all = vec![(ShapeKind::Jump, jumps), (ShapeKind::Bump, bumps), (ShapeKind::Trend, trends)];
     if covariate.name == FREQUENCY.name || covariate.name == SPEED.name {
         let through = |(row, width): &(usize, f64)| {
             SEEN.map(|phase| (values[*row], Form::Through(x[*row], *width, phase)))

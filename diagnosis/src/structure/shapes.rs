@@ -1,19 +1,19 @@
-//! Departures of a known shape, each by its own evidence: a jump, a bump, a period, a resonance or a rough
-//! function over one covariate, or what a pass before leaves.
+//! Departures of a known shape, each by its own evidence: a jump, a bump, a period, a resonance, a rough
+//! function or a trend over one covariate, or what a pass before leaves.
 //!
 //! `y = baseline + A h + scatter`, h the shape at one place, width or period, A ~ N(0, s^2) with s on a grid,
 //! the nuisances linear. The integral is exact, and the evidence of a shape is its mean over places. It acts
 //! on friction (turning with the direction) or on the sensor. A rough function is many columns h at once.
-//! Scatter that lasts can take up any of them, so each is also tried where independent scatter is all there
-//! is. docs/diagnosis/model.md, section 6.
+//! Each is also tried under other scatter (`ground`). docs/diagnosis/model.md, section 6.
 
 use super::axis::{Axis, Past};
-use super::factor::{Factor, factor, factor_of, white};
+use super::factor::{Factor, factor, factor_of};
 use super::form::{Form, Placement, Way};
+use super::ground::{Ground, grounds};
 use super::places::placed;
 use crate::evidence::Posterior;
 use crate::fit::Problem;
-use crate::gaussian::{Covariance, log_sum_exp};
+use crate::gaussian::log_sum_exp;
 use crate::layout::NUISANCES;
 use crate::scatter::Scatter;
 use effects::Input;
@@ -22,12 +22,10 @@ use nalgebra::{DMatrix, DVector};
 use rayon::prelude::*;
 use std::sync::Arc;
 
-/// Scales of independent scatter where none is to last.
-const SCALES: [f64; 4] = [1.0, 1.3, 1.7, 2.2];
 /// Passes that are looked at: of longer tables every second, third and so on.
 const MOST_PASSES: usize = 2000;
 /// Nats by which a rough function must lead more scatter, which is no function of a covariate.
-const ROUGH_LEAD: f64 = 5.0;
+const ROUGH_LEAD: f64 = 4.0;
 /// Share of its nats that counts for a rough function beside another shape: it also takes up what another
 /// form of that shape leaves, as of a square wave beside a sine.
 const ROUGH_SHARE: f64 = 0.7;
@@ -50,6 +48,8 @@ pub enum ShapeKind {
     Rough,
     /// What a pass before leaves.
     Memory,
+    /// A rise or fall from one end to the other.
+    Trend,
 }
 
 /// A departure of one kind over one covariate.
@@ -63,6 +63,8 @@ pub struct Shape {
     pub turns: bool,
     /// Log evidence over no gap's.
     pub nats: f64,
+    /// Log evidence over that of no gap, with larger scatter where that is likelier.
+    pub stands_out: f64,
     /// Place, or length of a period, with its 95 % interval, in the covariate's unit.
     pub at: (f64, [f64; 2]),
     /// Size in units of full friction, with its interval.
@@ -97,14 +99,6 @@ enum Columns {
     Several(Vec<[DMatrix<f64>; 2]>),
 }
 
-/// Scatter under which shapes are tried: its covariance, and log evidence of no gap under it beside that as
-/// settled.
-struct Ground {
-    covariance: Covariance,
-    nats: f64,
-    alone: Option<(f64, usize)>,
-}
-
 /// Every kind of shape over every covariate that may have it, clearest first.
 pub fn shapes(problem: &Problem, none: &Posterior, scatter: &Scatter) -> Vec<Shape> {
     let n = problem.len();
@@ -114,53 +108,25 @@ pub fn shapes(problem: &Problem, none: &Posterior, scatter: &Scatter) -> Vec<Sha
     let jacobian = part.jacobian(&[], &none.u, &prediction);
     let nuisance = DVector::from_column_slice(&none.u[..NUISANCES]);
     let residual = DVector::from_column_slice(&part.lateral) - &prediction + &jacobian * nuisance;
-    let grounds = grounds(&part, &jacobian, &residual, scatter.lasting_columns(problem), scatter.slow_cost);
+    let lasting = (scatter, scatter.lasting_columns(problem));
+    let (grounds, more) = grounds(&part, &jacobian, &residual, (none, &prediction), lasting);
     let past = Arc::new(Past::of(&problem.passes));
     let mut list: Vec<Shape> = families(&part, &past, &none.u, &prediction)
         .par_iter()
-        .map(|family| weighed(family, &grounds, &residual))
+        .map(|family| weighed(family, &grounds, &residual, more))
         .collect();
-    let white = white(&part, &jacobian, &residual, none, &prediction);
-    list.retain(|shape| shape.kind != ShapeKind::Rough || shape.nats > white + ROUGH_LEAD);
+    list.retain(|shape| shape.kind != ShapeKind::Rough || shape.nats > more + ROUGH_LEAD);
     list.sort_by(|a, b| b.order_nats().total_cmp(&a.order_nats()));
     list
 }
 
-/// Log evidence of any of them over no gap's.
+/// Log evidence of any of them over no gap's. Trends are smooth: they have their part in the open set.
 pub fn nats(shapes: &[Shape]) -> f64 {
-    let all: Vec<f64> = shapes.iter().map(|s| s.nats).collect();
+    let all: Vec<f64> = shapes.iter().filter(|s| s.kind != ShapeKind::Trend).map(|s| s.nats).collect();
     log_sum_exp(&all) - (all.len().max(1) as f64).ln()
 }
 
-fn grounds(
-    part: &Problem,
-    jacobian: &DMatrix<f64>,
-    residual: &DVector<f64>,
-    lasting: usize,
-    cost: f64,
-) -> Vec<Ground> {
-    let evidence = |c: &Covariance| -0.5 * (c.quadratic(residual) + c.log_det());
-    let settled = part.covariance(jacobian);
-    let own = evidence(&settled);
-    let mut list = vec![Ground { covariance: settled, nats: 0.0, alone: None }];
-    if lasting > 0 {
-        list.extend(SCALES.map(|scale| {
-            let covariance = independent(part, scale, lasting).covariance(jacobian);
-            let nats = evidence(&covariance) - own + cost - (SCALES.len() as f64).ln();
-            Ground { covariance, nats, alone: Some((scale, lasting)) }
-        }));
-    }
-    list
-}
-
-/// A problem whose scatter is this much larger and does not last.
-pub(super) fn independent(part: &Problem, scale: f64, lasting: usize) -> Problem {
-    let shifts = part.common.columns(lasting, part.common.ncols() - lasting).into_owned();
-    let variance = part.variance.iter().map(|v| v * scale * scale).collect();
-    Problem { common: shifts, variance, ..part.clone() }
-}
-
-fn weighed(family: &Family, grounds: &[Ground], residual: &DVector<f64>) -> Shape {
+fn weighed(family: &Family, grounds: &[Ground], residual: &DVector<f64>, more: f64) -> Shape {
     let count = family.at.len() as f64;
     let mut parts: Vec<(f64, Vec<Factor>)> = Vec::new();
     for ground in grounds {
@@ -176,9 +142,7 @@ fn weighed(family: &Family, grounds: &[Ground], residual: &DVector<f64>) -> Shap
         let all: Vec<f64> = each.iter().map(|e| e.nats).collect();
         parts.push((ground.nats + log_sum_exp(&all) - count.ln(), each));
     }
-    // Half the weight for scatter as settled, half for independent scatter.
-    let share = if grounds.len() > 1 { 0.5_f64.ln() } else { 0.0 };
-    let total: Vec<f64> = parts.iter().map(|p| p.0 + share).collect();
+    let nats = log_sum_exp(&parts.iter().map(|p| p.0).collect::<Vec<_>>());
     let under = (0..parts.len()).max_by(|&i, &j| parts[i].0.total_cmp(&parts[j].0)).unwrap_or(0);
     let best = parts[under].1.as_slice();
     let top = (0..best.len()).max_by(|&i, &j| best[i].nats.total_cmp(&best[j].nats)).unwrap_or(0);
@@ -198,12 +162,13 @@ fn weighed(family: &Family, grounds: &[Ground], residual: &DVector<f64>) -> Shap
     let [low, high] = ENDS.map(end);
     let below = places.clone().rfind(|at| *at < low).unwrap_or(low);
     let above = places.clone().find(|at| *at > high).unwrap_or(high);
-    let (size, sd, alone) = (best[top].mean * family.unit, best[top].sd * family.unit, grounds[under].alone);
+    let (size, sd) = (best[top].mean * family.unit, best[top].sd * family.unit);
     Shape {
         kind: family.kind,
         covariate: family.axis.covariate,
         turns: !matches!(family.way, Way::Reading(_)),
-        nats: log_sum_exp(&total),
+        nats,
+        stands_out: nats - more.max(0.0),
         at: (family.at[top], [0.5 * (low + below), 0.5 * (high + above)]),
         size: (size, [size - 1.96 * sd, size + 1.96 * sd]),
         best: Placement {
@@ -211,7 +176,7 @@ fn weighed(family: &Family, grounds: &[Ground], residual: &DVector<f64>) -> Shap
             form: family.forms[top].clone(),
             way: family.way,
             sd: best[top].size,
-            alone,
+            under: grounds[under].under,
         },
     }
 }
@@ -312,6 +277,18 @@ mod tests {
             assert!(best.size.0 * (factor - 1.0) > 0.0, "{factor}: {:?}", best.size);
             assert!(best.nats > 0.7 * gap, "{} nats of a gap of {gap}", best.nats);
         }
+    }
+
+    /// A coefficient that rises with the speed by half, evenly or at high speed only: a trend over it.
+    #[test]
+    fn a_smooth_rise_is_a_trend() {
+        let share = |p: &Condition| (p.speed_m_s / 0.01).ln() / 9f64.ln();
+        let found = [1, 3].map(|power| best(filled(), |p, _| 1.0 + 0.5 * share(p).powi(power)).0);
+        for shape in &found {
+            assert_eq!((shape.kind, shape.covariate.name), (ShapeKind::Trend, "speed_m_s"), "{shape:?}");
+            assert!(shape.size.0 > 0.0, "{:?}", shape.size);
+        }
+        assert!(found[1].at.0 >= found[0].at.0, "{:?}", found.map(|shape| shape.at));
     }
 
     /// A coefficient that goes with the load of the pass before, or with whether the direction has turned: a

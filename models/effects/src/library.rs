@@ -90,6 +90,7 @@ causes! {
     open_set {
         charging
         frictional_heating
+        gain_drift
         lateral_resonance
         second_harmonic
     }

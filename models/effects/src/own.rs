@@ -73,6 +73,9 @@ pub fn at(number: usize) -> &'static Effect {
     KNOWN.get(number).copied().unwrap_or_else(own)
 }
 
+/// Names that a verdict has for something else.
+const ANSWERS: [&str; 4] = ["unknown", "no_gap", "named", "ambiguous"];
+
 /// Reads a user's own effect; its number.
 ///
 /// # Errors
@@ -84,6 +87,9 @@ pub fn own(name: &str, text: &str) -> Result<usize, String> {
         return Err(format!(
             "'{name}' is not a name of an effect: rename the file to letters a to z, digits and _"
         ));
+    }
+    if ANSWERS.contains(&name) {
+        return Err(format!("'{name}' is an answer of a verdict: rename the file"));
     }
     if KNOWN.iter().any(|e| e.name == name) {
         return Err(format!("'{name}' is an effect of the library: rename the file"));

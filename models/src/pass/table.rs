@@ -246,7 +246,7 @@ pub fn read_readable(from: impl Read) -> Readable {
 }
 
 fn read_into(from: impl Read, found: &mut Readable) -> Result<(), TableError> {
-    let mut reader = csv::ReaderBuilder::new().trim(csv::Trim::All).from_reader(from);
+    let mut reader = csv::ReaderBuilder::new().comment(Some(b'#')).trim(csv::Trim::All).from_reader(from);
     let mut header = reader.headers()?.clone();
     // Spreadsheets put a byte-order mark before the first name.
     if let Some(first) = header.get(0).and_then(|h| h.strip_prefix('\u{feff}')) {
@@ -343,6 +343,9 @@ mod tests {
         assert!(
             error("point,time_s\n1,2\n").contains("missing columns: amplitude_pp_m, speed_m_s, direction,")
         );
+        let remarked =
+            format!("# a bench\n{HEAD}\n1,0,2e-6,27500,0.02,1,0,0.25,0.1\n2,0,x,27500,0.02,1,0,0.25,0.1");
+        assert!(error(&remarked).starts_with("line 4: 'amplitude_pp_m' is 'x'"), "{}", error(&remarked));
         let rows = |row: &str| format!("{HEAD}\n1,0,2e-6,27500,0.02,1,0,0.25,0.1\n{row}\n");
         assert!(
             error(&rows("2,0,-2e-6,27500,0.02,1,0,0.25,0.1"))
