@@ -18,7 +18,7 @@ pub mod map;
 pub mod resonance;
 pub mod vibrometer;
 
-use crate::regression::FitError;
+use crate::regression::{Fit, FitError};
 
 /// One amplitude as a vibrometer measured it.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -74,11 +74,21 @@ fn check(points: &[AmplitudePoint], what: &'static str, needed: usize) -> Result
     Ok(())
 }
 
-/// Scatter of amplitudes up to a factor: proportional to them (speckle, drive) above a floor of a fifth of
-/// the largest (noise of the vibrometer).
-fn relative_scatter(points: &[AmplitudePoint]) -> Vec<f64> {
-    let largest = points.iter().fold(0f64, |m, p| m.max(p.amplitude_pp_m));
-    points.iter().map(|p| p.amplitude_pp_m.hypot(0.2 * largest)).collect()
+/// A fit to amplitudes over their scatter: up to a factor, proportional to the amplitude (speckle, drive)
+/// above a floor of a fifth of the largest (noise of the vibrometer). The scatter is that of the fitted curve:
+/// by the measured amplitudes, those that scattered low would weigh more.
+fn weighted(
+    points: &[AmplitudePoint],
+    fit: impl Fn(&[f64]) -> Result<Fit, FitError>,
+) -> Result<Fit, FitError> {
+    let scatter = |curve: Vec<f64>| -> Vec<f64> {
+        let largest = curve.iter().fold(0f64, |m, w| m.max(w.abs()));
+        curve.iter().map(|w| w.hypot(0.2 * largest)).collect()
+    };
+    let measured = scatter(points.iter().map(|p| p.amplitude_pp_m).collect());
+    let first = fit(&measured)?;
+    let left = first.residuals.iter().zip(&measured).map(|(r, s)| r * s);
+    fit(&scatter(points.iter().zip(left).map(|(p, left)| p.amplitude_pp_m - left).collect()))
 }
 
 /// Lack of fit of weighted residuals against replicates at one place; `None` without enough replicates.

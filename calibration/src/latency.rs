@@ -19,6 +19,12 @@ pub enum LatencyError {
         "channel `{channel}`: {found} edges are too few for a delay and its scatter, {needed} are needed"
     )]
     TooFew { channel: String, found: usize, needed: usize },
+    /// Edges that differ by nothing.
+    #[error(
+        "channel `{channel}`: all its delays are equal: they differ by less than their resolution; state it \
+         (--resolution-s), or give more digits"
+    )]
+    Equal { channel: String },
     /// A response before its cause.
     #[error(
         "channel `{channel}`: its mean delay is {delay_s:.2e} s, an answer before its cause: its clock is ahead, or \
@@ -48,7 +54,8 @@ pub struct ChannelDelay {
 /// `resolution_s` is the resolution of the reference (stage time stamps), taken as rectangular.
 ///
 /// # Errors
-/// Fewer than eight edges, or a mean delay below zero by more than three of its uncertainties.
+/// Fewer than eight edges, all equal without a resolution, or a mean delay below zero by more than three of
+/// its uncertainties.
 pub fn channel_delay(
     channel: &str,
     delays_s: &[f64],
@@ -57,6 +64,10 @@ pub fn channel_delay(
     const NEEDED: usize = 8;
     if delays_s.len() < NEEDED {
         return Err(LatencyError::TooFew { channel: channel.into(), found: delays_s.len(), needed: NEEDED });
+    }
+    let [least, largest] = crate::regression::ends(delays_s.iter().copied());
+    if least == largest && resolution_s == 0.0 {
+        return Err(LatencyError::Equal { channel: channel.into() });
     }
     let mut delay = Input::type_a(delays_s);
     let statistical = delay.standard_uncertainty;
@@ -74,7 +85,7 @@ pub fn channel_delay(
         delay,
         jitter_s,
         jitter_ci95_s: [bound(0.975), bound(0.025)],
-        range_s: crate::regression::ends(delays_s.iter().copied()),
+        range_s: [least, largest],
         edges: delays_s.len(),
     })
 }

@@ -12,6 +12,7 @@
 //! | [`certificate`] | the file that a calibration leaves, and the gate before its use |
 //! | [`prior`] | what certificates leave open, for the diagnosis |
 //! | [`regression`], [`uncertainty`] | least squares; GUM |
+//! | `rows` | rows of a CSV table, with the column of what cannot be read |
 //!
 //! The way through: data file -> a module's fit, which refuses what is unfit -> [`certificate::Outcome`] ->
 //! [`certificate::Certificate`] (a sealed TOML file) -> [`certificate::Certificate::verify`] ->
@@ -26,4 +27,5 @@ pub mod latency;
 pub mod phase;
 pub mod prior;
 pub mod regression;
+mod rows;
 pub mod uncertainty;

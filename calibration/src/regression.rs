@@ -31,6 +31,21 @@ impl Fit {
         (self.residual_sum_of_squares / self.degrees_of_freedom).sqrt()
     }
 
+    /// The same, where it leaves so much less of these observations than their mean does that chance does not
+    /// explain it. The F ratio is above ten: noise searched for its best frequency reaches three or four.
+    ///
+    /// # Errors
+    /// [`FitError::Constant`].
+    pub fn better_than_a_constant(self, observations: &[f64]) -> Result<Self, FitError> {
+        let n = observations.len() as f64;
+        let mean = observations.iter().sum::<f64>() / n;
+        let constant = observations.iter().map(|y| (y - mean).powi(2)).sum::<f64>();
+        let gained = (constant - self.residual_sum_of_squares) / (self.estimates.len() as f64 - 1.0);
+        let ratio = gained * self.degrees_of_freedom / self.residual_sum_of_squares;
+        // A fit without residuals has an infinite ratio, a constant that is fitted exactly none.
+        if ratio > 10.0 { Ok(self) } else { Err(FitError::Constant { ratio }) }
+    }
+
     /// Standard uncertainty of one parameter.
     pub fn standard_uncertainty(&self, parameter: usize) -> f64 {
         self.covariance[(parameter, parameter)].sqrt()
@@ -61,6 +76,11 @@ pub enum FitError {
     /// A number that is not finite went in or came out.
     #[error("a value is not finite ({place})")]
     NotFinite { place: &'static str },
+    /// The observations are noise.
+    #[error(
+        "the model describes the values no better than a constant (F = {ratio:.1}, above 10 is needed): they are noise"
+    )]
+    Constant { ratio: f64 },
     /// The iteration of a non-linear fit did not settle.
     #[error("the fit did not converge in {iterations} iterations")]
     NotConverged { iterations: usize },

@@ -295,7 +295,10 @@ impl Common {
         raw: RawData,
         more: impl IntoIterator<Item = (&'static str, serde_json::Value)>,
     ) -> miette::Result<Issued> {
+        let origin = raw.origin.clone();
         let certificate = outcome.certify(&self.occasion(raw)?);
+        // What `check` would refuse is not issued.
+        certificate.verify_content().map_err(|e| miette::miette!("{origin}: no certificate: {e}"))?;
         let safe: String =
             self.serial.chars().map(|c| if c.is_ascii_alphanumeric() { c } else { '-' }).collect();
         let out =

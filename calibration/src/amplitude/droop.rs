@@ -1,6 +1,6 @@
 //! Amplitude under load: `w = w_free / (1 + d F^p)`.
 
-use super::{AmplitudeError, AmplitudePoint, check, lack_of_fit, relative_scatter};
+use super::{AmplitudeError, AmplitudePoint, check, lack_of_fit, weighted};
 use crate::regression::Fit;
 use crate::regression::nonlinear::fit;
 
@@ -47,17 +47,18 @@ pub fn droop(points: &[AmplitudePoint], exponent: Exponent) -> Result<Droop, Amp
         let reason = "droop needs loads that press and amplitudes above zero".into();
         return Err(AmplitudeError::Bad { row: i + 1, reason });
     }
-    let scatter = relative_scatter(points);
-    let y: Vec<f64> = points.iter().zip(&scatter).map(|(p, s)| p.amplitude_pp_m / s).collect();
-    let model = |i: usize, b: &[f64], g: &mut [f64]| {
-        let power = points[i].at.powf(exponent.value());
-        let value = b[0].exp() / (1.0 + b[1] * power) / scatter[i];
-        g[0] = value;
-        g[1] = -value * power / (1.0 + b[1] * power);
-        value
-    };
     let top = points.iter().fold(0f64, |m, p| m.max(p.amplitude_pp_m));
-    let fit = fit(&model, &y, &[top.ln(), 0.05])?;
+    let fit = weighted(points, |scatter| {
+        let y: Vec<f64> = points.iter().zip(scatter).map(|(p, s)| p.amplitude_pp_m / s).collect();
+        let model = |i: usize, b: &[f64], g: &mut [f64]| {
+            let power = points[i].at.powf(exponent.value());
+            let value = b[0].exp() / (1.0 + b[1] * power) / scatter[i];
+            g[0] = value;
+            g[1] = -value * power / (1.0 + b[1] * power);
+            value
+        };
+        fit(&model, &y, &[top.ln(), 0.05])
+    })?;
     if let Some(p) = lack_of_fit(points, fit.residuals.as_slice(), 2).filter(|p| *p < 1e-3) {
         let remedy = "try the other exponent, and check the drive's limit";
         return Err(AmplitudeError::LackOfFit { p, remedy });

@@ -3,8 +3,8 @@
 //! `w = w0 (1 - d + d |cos(2 pi (x - x0) / lambda)|)`: a standing wave with share `d`, on top of what travels
 //! and leaves no node. `d = 1` is that of a pure standing wave.
 
-use super::{AmplitudeError, AmplitudePoint, check, relative_scatter};
-use crate::regression::{Fit, ends, nonlinear};
+use super::{AmplitudeError, AmplitudePoint, check, weighted};
+use crate::regression::{Fit, FitError, ends, nonlinear};
 use std::f64::consts::PI;
 
 /// A fitted mode shape.
@@ -33,15 +33,34 @@ pub fn mode_shape(points: &[AmplitudePoint]) -> Result<ModeShape, AmplitudeError
     let range_m = ends(points.iter().map(|p| p.at));
     let (length, middle) = (range_m[1] - range_m[0], 0.5 * (range_m[0] + range_m[1]));
     let top = points.iter().fold(0f64, |m, p| m.max(p.amplitude_pp_m));
-    let scatter: Vec<f64> = relative_scatter(points).iter().map(|s| s / top).collect();
-    let y: Vec<f64> = points.iter().zip(&scatter).map(|(p, s)| p.amplitude_pp_m / top / s).collect();
+    let mut fit = weighted(points, |scatter| best(points, scatter, top, [length, middle]))?;
+    // The antinode nearest to the middle: the same curve, a position that can be compared.
+    let half = fit.estimates[2] / 2.0;
+    let steps = ((middle - fit.estimates[1]) / half).round();
+    fit.estimates[1] += steps * half;
+    let mut to_antinode = nalgebra::DMatrix::identity(4, 4);
+    (to_antinode[(0, 0)], to_antinode[(1, 2)]) = (top, steps / 2.0);
+    fit.covariance = &to_antinode * &fit.covariance * to_antinode.transpose();
+    fit.estimates[0] *= top;
+    let pair = |k: usize| [fit.estimates[k], fit.standard_uncertainty(k)];
+    Ok(ModeShape { antinode_at_m: pair(1), wavelength_m: pair(2), standing_share: pair(3), range_m, fit })
+}
+
+/// Parameters: amplitude at an antinode over `top`, antinode, wavelength, standing share.
+fn best(
+    points: &[AmplitudePoint],
+    scatter: &[f64],
+    top: f64,
+    [length, middle]: [f64; 2],
+) -> Result<Fit, FitError> {
+    let y: Vec<f64> = points.iter().zip(scatter).map(|(p, s)| p.amplitude_pp_m / s).collect();
     let model = |i: usize, b: &[f64], g: &mut [f64]| {
         let angle = 2.0 * PI * (points[i].at - b[1]) / b[2];
         let (s, c) = angle.sin_cos();
         let sign = c.signum();
         let shape = 1.0 - b[3] * (1.0 - c.abs());
-        let weighted = b[0] / scatter[i];
-        g[0] = shape / scatter[i];
+        let weighted = b[0] * top / scatter[i];
+        g[0] = shape * top / scatter[i];
         g[1] = weighted * b[3] * sign * s * 2.0 * PI / b[2];
         g[2] = weighted * b[3] * sign * s * angle / b[2];
         g[3] = -weighted * (1.0 - c.abs());
@@ -59,17 +78,7 @@ pub fn mode_shape(points: &[AmplitudePoint]) -> Result<ModeShape, AmplitudeError
         .collect();
     starts.sort_by(|a, b| a.0.total_cmp(&b.0));
     let starts = starts.into_iter().take(8).map(|(_, start)| start);
-    let mut fit = nonlinear::best(&model, &y, starts, |f| f.estimates[2] > 0.0)?;
-    // The antinode nearest to the middle: the same curve, a position that can be compared.
-    let half = fit.estimates[2] / 2.0;
-    let steps = ((middle - fit.estimates[1]) / half).round();
-    fit.estimates[1] += steps * half;
-    let mut to_antinode = nalgebra::DMatrix::identity(4, 4);
-    (to_antinode[(0, 0)], to_antinode[(1, 2)]) = (top, steps / 2.0);
-    fit.covariance = &to_antinode * &fit.covariance * to_antinode.transpose();
-    fit.estimates[0] *= top;
-    let pair = |k: usize| [fit.estimates[k], fit.standard_uncertainty(k)];
-    Ok(ModeShape { antinode_at_m: pair(1), wavelength_m: pair(2), standing_share: pair(3), range_m, fit })
+    nonlinear::best(&model, &y, starts, |f| f.estimates[2] > 0.0)
 }
 
 fn misfit(model: &impl Fn(usize, &[f64], &mut [f64]) -> f64, y: &[f64], b: &[f64; 4]) -> f64 {

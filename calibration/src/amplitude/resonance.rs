@@ -1,6 +1,6 @@
 //! Resonance frequency and quality factor from a frequency sweep at constant drive.
 
-use super::{AmplitudeError, AmplitudePoint, check, relative_scatter};
+use super::{AmplitudeError, AmplitudePoint, check, weighted};
 use crate::regression::{Fit, FitError, nonlinear};
 
 /// The resonance that a sweep shows.
@@ -38,7 +38,8 @@ pub fn sweep(points: &[AmplitudePoint]) -> Result<Resonance, AmplitudeError> {
     }
     let wide = points.iter().filter(|p| p.amplitude_pp_m > 0.707 * top.amplitude_pp_m);
     let [low, high] = wide.fold([top.at, top.at], |[a, b], p| [a.min(p.at), b.max(p.at)]);
-    let fit = best(points, &top, (high - low).max(1e-5 * top.at))?;
+    let width = (high - low).max(1e-5 * top.at);
+    let fit = weighted(points, |scatter| best(points, scatter, &top, width))?;
     let q = fit.estimates[1].exp();
     Ok(Resonance {
         frequency_hz: [fit.estimates[0], fit.standard_uncertainty(0)],
@@ -49,9 +50,13 @@ pub fn sweep(points: &[AmplitudePoint]) -> Result<Resonance, AmplitudeError> {
 
 /// Parameters: f0, ln Q, ln w0, tilt (near -1/2 where a constant force drives a displacement, 0 for a pure
 /// Lorentzian); amplitudes weighted by their scatter.
-fn best(points: &[AmplitudePoint], top: &AmplitudePoint, width: f64) -> Result<Fit, FitError> {
-    let scatter = relative_scatter(points);
-    let y: Vec<f64> = points.iter().zip(&scatter).map(|(p, s)| p.amplitude_pp_m / s).collect();
+fn best(
+    points: &[AmplitudePoint],
+    scatter: &[f64],
+    top: &AmplitudePoint,
+    width: f64,
+) -> Result<Fit, FitError> {
+    let y: Vec<f64> = points.iter().zip(scatter).map(|(p, s)| p.amplitude_pp_m / s).collect();
     let model = |i: usize, b: &[f64], g: &mut [f64]| {
         let (f0, q) = (b[0], b[1].exp());
         let delta = (points[i].at - f0) / f0;
@@ -66,7 +71,7 @@ fn best(points: &[AmplitudePoint], top: &AmplitudePoint, width: f64) -> Result<F
         value
     };
     let start = |factor: f64| [top.at, (factor * top.at / width).ln(), top.amplitude_pp_m.ln(), 0.0];
-    nonlinear::best(&model, &y, [1.0, 0.5, 2.0].map(start), |_| true)
+    nonlinear::best(&model, &y, [1.0, 0.5, 2.0].map(start), |_| true)?.better_than_a_constant(&y)
 }
 
 #[cfg(test)]

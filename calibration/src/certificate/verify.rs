@@ -3,6 +3,10 @@
 use super::{Certificate, CertificateKind, date};
 use nalgebra::DMatrix;
 
+/// Parameters that are above zero by nature: data whose interval reaches zero do not determine them.
+const ABOVE_ZERO: &str = "gain resonance_hz quality_factor step.natural_frequency step.bandwidth step.damping_ratio \
+                          mount.resonance mount.damping_ratio lateral.noise_sd normal.noise_sd orientation.weight";
+
 /// Where, when and on what a certificate is to be used.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Circumstances<'a> {
@@ -99,6 +103,13 @@ impl Certificate {
                 return malformed(format!(
                     "the interval of `{}` ({low:e} to {high:e}) does not hold its value {:e}",
                     p.name, p.value
+                ));
+            }
+            if p.ci95[0] <= 0.0 && ABOVE_ZERO.split(' ').any(|name| name == p.name) {
+                let [low, high] = p.ci95;
+                return malformed(format!(
+                    "`{}` is above zero, and its interval ({low:.3e} to {high:.3e}) is not: the data do not determine it",
+                    p.name
                 ));
             }
             if (sd(i) - p.standard_uncertainty).abs() > 1e-6 * p.standard_uncertainty {

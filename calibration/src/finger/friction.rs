@@ -41,12 +41,9 @@ pub struct FrictionFit {
 /// # Errors
 /// The first row that cannot be read or cannot be.
 pub fn read(input: impl Read) -> Result<Vec<FrictionPoint>, FingerError> {
-    let mut reader = csv::ReaderBuilder::new().trim(csv::Trim::All).comment(Some(b'#')).from_reader(input);
-    let mut points = Vec::new();
-    for (i, row) in reader.deserialize::<FrictionPoint>().enumerate() {
-        points.push(row.map_err(|e| FingerError::Bad { row: i + 1, reason: e.to_string() })?);
-    }
-    Ok(points)
+    let rows =
+        crate::rows::read(input).map_err(|(line, reason)| FingerError::Bad { row: line as usize, reason })?;
+    Ok(rows.into_iter().map(|(_, point)| point).collect())
 }
 
 /// Fits the law. The scatter of ln mu0 is taken as equal everywhere. The time dependence is fitted where

@@ -12,6 +12,8 @@ pub struct Creep {
     pub time_constant_s: [f64; 2],
     /// Reading right after the load, net of the zero, in counts.
     pub counts: f64,
+    /// Standard deviation of what the fit left, and the largest of it, in counts.
+    pub residual: [f64; 2],
 }
 
 impl Creep {
@@ -41,6 +43,7 @@ impl Creep {
             relative: [relative, u],
             time_constant_s: [tau, tau * best.standard_uncertainty(2)],
             counts: c0,
+            residual: [best.residual_sd(), best.residuals.amax()],
         })
     }
 }

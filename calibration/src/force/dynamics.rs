@@ -66,7 +66,7 @@ pub fn step_response(time_s: &[f64], samples: &[f64], step_at_s: f64) -> Result<
     let starts = [(0.2, 0.7), (0.5, 0.7), (0.8, 0.7), (0.5, 0.3), (0.5, 1.2)]
         .map(|(share, zeta)| [low, high - low, share * half, omega(share).ln(), zeta]);
     let possible = |f: &Fit| f.estimates[4] > 0.0 && f.estimates[2] > -2.0 / rate;
-    let best = best(&model, samples, starts, possible)?;
+    let best = best(&model, samples, starts, possible)?.better_than_a_constant(samples)?;
     let (omega, zeta) = (best.estimates[3].exp(), best.estimates[4]);
     let ratio = bandwidth_ratio(zeta);
     let natural = omega / (2.0 * PI);
@@ -152,7 +152,8 @@ pub fn ring_down(time_s: &[f64], samples: &[f64]) -> Result<RingDown, FitError> 
     };
     let omega = 2.0 * PI * guess_hz;
     let starts = [0.01, 0.03, 0.1, 0.3].map(|zeta| [mean, samples[0] - mean, 0.0, omega, zeta * omega]);
-    let best = best(&model, samples, starts, |f| f.estimates[3] > 0.0 && f.estimates[4] > 0.0)?;
+    let decays = |f: &Fit| f.estimates[3] > 0.0 && f.estimates[4] > 0.0;
+    let best = best(&model, samples, starts, decays)?.better_than_a_constant(samples)?;
     let (damped, sigma) = (best.estimates[3], best.estimates[4]);
     let natural = damped.hypot(sigma);
     let n3 = natural.powi(3);

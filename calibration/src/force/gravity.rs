@@ -21,8 +21,8 @@ pub struct Orientation {
     pub weight_n: [f64; 2],
     /// Offsets of the two axes in N, which gravity has no part in.
     pub offset_n: [f64; 2],
-    /// Residual standard deviation in N.
-    pub residual_sd_n: f64,
+    /// Standard deviation of what the fit left, and the largest of it, in N.
+    pub residual_n: [f64; 2],
 }
 
 /// Fits `F_l = W sin(tilt + angle) + o_l`, `F_n = W cos(tilt + angle) + o_n`, which is linear in
@@ -44,7 +44,7 @@ pub fn orientation(readings: &[TiltReading]) -> Result<Orientation, FitError> {
         angle_rad: [s.atan2(c), fit.standard_uncertainty_along(&[-s / w2, c / w2, 0.0, 0.0])],
         weight_n: [w2.sqrt(), fit.standard_uncertainty_along(&[c / w2.sqrt(), s / w2.sqrt(), 0.0, 0.0])],
         offset_n: [fit.estimates[2], fit.estimates[3]],
-        residual_sd_n: fit.residual_sd(),
+        residual_n: [fit.residual_sd(), fit.residuals.amax()],
     })
 }
 

@@ -71,10 +71,10 @@ pub enum ForceError {
     AxisBlind { axis: Axis, own: f64, other: f64 },
     /// The zero moved too far while weights were read.
     #[error(
-        "the zero of the {axis} channel drifted by {counts:.1} counts over the series ({percent:.2} % of the \
-         span, {limit:.2} % are allowed): let it warm up, then repeat"
+        "the zero of the {axis} channel drifted by {counts:.1} +- {sd:.1} counts over the series ({percent:.2} % of the \
+         span, {limit:.2} % are allowed): {remedy}"
     )]
-    DriftingZero { axis: Axis, counts: f64, percent: f64, limit: f64 },
+    DriftingZero { axis: Axis, counts: f64, sd: f64, percent: f64, limit: f64, remedy: &'static str },
     /// Neighbouring readings err alike.
     #[error(
         "neighbouring readings of the {axis} channel err alike (correlation {correlation:.2}): the zero wanders \

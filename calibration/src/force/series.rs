@@ -1,6 +1,7 @@
 //! The data of a dead-weight calibration: one row for each steady reading.
 
 use super::Axis;
+use crate::rows;
 use serde::Deserialize;
 use std::io::Read;
 
@@ -117,15 +118,9 @@ struct Row {
 /// # Errors
 /// The first row that cannot be read, with its line.
 pub fn read(input: impl Read, weighing: &Weighing) -> Result<Vec<LoadReading>, SeriesError> {
-    let mut reader = csv::ReaderBuilder::new().trim(csv::Trim::All).comment(Some(b'#')).from_reader(input);
-    let headers = reader.headers().map_err(|e| SeriesError { row: 1, reason: e.to_string() })?.clone();
     let mut readings = Vec::new();
-    for record in reader.records() {
-        let line = |e: &csv::Error| e.position().map_or(0, csv::Position::line);
-        let record = record.map_err(|e| SeriesError { row: line(&e), reason: e.to_string() })?;
-        let row = record.position().map_or(0, csv::Position::line);
+    for (row, cells) in rows::read::<Row>(input).map_err(|(row, reason)| SeriesError { row, reason })? {
         let fail = |reason: String| SeriesError { row, reason };
-        let cells: Row = record.deserialize(Some(&headers)).map_err(|e| fail(e.to_string()))?;
         let axis = match cells.axis.as_str() {
             "zero" => None,
             "lateral" => Some(Axis::Lateral),
@@ -180,7 +175,7 @@ mod tests {
             ("1,normal,,1,1", "either mass_kg or load_n"),
             ("1,zero,0.1,1,1", "carries no mass"),
             ("1,normal,0.1,NaN,1", "not finite"),
-            ("1,normal,0.1,x,1", "invalid float"),
+            ("1,normal,0.1,x,1", "lateral_counts: invalid float"),
         ] {
             let error = read(format!("{head}{row}\n").as_bytes(), &Weighing::default()).unwrap_err();
             assert_eq!(error.row, 3);

@@ -1,5 +1,6 @@
 //! The phase table of docs/contract.md (`PHASES.csv`): what `calibrate phase` writes and `calibrate finger` reads.
 
+use crate::rows;
 use models::quantity::PeakToPeak;
 use serde::{Deserialize, Serialize};
 use std::io::{Read, Write};
@@ -39,15 +40,10 @@ pub struct TableError {
 /// # Errors
 /// The first row that cannot be read or cannot be true, with its line.
 pub fn read_phases(input: impl Read) -> Result<Vec<PhasePoint>, TableError> {
-    let mut reader = csv::ReaderBuilder::new().trim(csv::Trim::All).comment(Some(b'#')).from_reader(input);
-    let at = |e: &csv::Error| e.position().map_or(0, csv::Position::line);
-    let headers = reader.headers().map_err(|e| TableError { line: 1, reason: e.to_string() })?.clone();
     let mut points = Vec::new();
-    for record in reader.records() {
-        let record = record.map_err(|e| TableError { line: at(&e), reason: e.to_string() })?;
-        let line = record.position().map_or(0, csv::Position::line);
+    let rows = rows::read::<PhasePoint>(input).map_err(|(line, reason)| TableError { line, reason })?;
+    for (line, row) in rows {
         let fail = |reason: String| TableError { line, reason };
-        let row: PhasePoint = record.deserialize(Some(&headers)).map_err(|e| fail(e.to_string()))?;
         let w = row.amplitude.metres();
         if !(w.is_finite() && w >= 0.0) {
             return Err(fail(format!("amplitude_pp_m = {w} is not an amplitude")));

@@ -143,8 +143,10 @@ pub fn certified(args: &Args, bench: &dyn Bench) -> miette::Result<Issued> {
     }));
     outcome.temperature_c = match args.temperature_c.as_deref() {
         None => None,
-        Some([low, high]) if low < high => Some([*low, *high]),
-        Some(other) => miette::bail!("--temperature-c {other:?}: two temperatures, the lower one first"),
+        Some([low, high]) if -40.0 <= *low && low < high && *high <= 100.0 => Some([*low, *high]),
+        Some(other) => {
+            miette::bail!("--temperature-c {other:?}: two of -40 to 100 deg C, the lower one first")
+        }
     };
     args.common.certify(outcome, sources.raw_data())
 }

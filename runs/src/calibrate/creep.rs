@@ -30,9 +30,7 @@ pub fn certified(args: &Args) -> miette::Result<Issued> {
             "{shown}: no certificate: {e}; is the record longer than the creep, and loaded at all?"
         )
     })?;
-    let [a, tau] = [found.relative[0], found.time_constant_s[0]];
-    let left: Vec<f64> =
-        rows.iter().map(|[t, c]| c - found.counts * (1.0 + a * (1.0 - (-t / tau).exp()))).collect();
+    let tau = found.time_constant_s[0];
     let dof = rows.len() as f64 - 3.0;
     let mut remarks = Vec::new();
     if tau > 0.5 * (time[time.len() - 1] - time[0]) {
@@ -47,8 +45,7 @@ pub fn certified(args: &Args) -> miette::Result<Issued> {
         Finding::new("creep.relative", "1", found.relative, dof),
         Finding::new("creep.time_constant", "s", found.time_constant_s, dof),
     ];
-    let sd = (left.iter().map(|r| r * r).sum::<f64>() / dof).sqrt();
-    let (count, largest) = (left.len() as u64, left.iter().fold(0f64, |m, r| m.max(r.abs())));
+    let (count, [sd, largest]) = (rows.len() as u64, found.residual);
     let residuals = Residuals { count, sd, largest, unit: "counts".into(), lack_of_fit_p: None };
     let model = "counts(t) = c0 (1 + relative (1 - exp(-t / time_constant)))";
     args.common.certify(outcome(model, &findings, residuals, remarks), sources.raw_data())

@@ -19,11 +19,7 @@ pub struct Args {
 }
 
 /// One event's answer: what it found, and standard deviation and largest of what the fit left.
-struct Event {
-    found: Vec<Estimate>,
-    samples: usize,
-    residual: [f64; 2],
-}
+type Event = (Vec<Estimate>, [f64; 2]);
 
 /// A step of force: second-order low-pass with dead time.
 pub fn step(args: &Args) -> miette::Result<Issued> {
@@ -35,13 +31,10 @@ pub fn step(args: &Args) -> miette::Result<Issued> {
     ];
     let model =
         "value = base + height step(t - delay) of a second-order low-pass; bandwidth where it is 3 dB down";
-    run(args, &NAMES, model, |time, value| {
+    run(args, &NAMES, model, f64::NEG_INFINITY, |time, value| {
         let found = step_response(time, value, 0.0)?;
-        Ok(Event {
-            found: vec![found.delay_s, found.natural_frequency_hz, found.damping_ratio, found.bandwidth_hz],
-            samples: time.len(),
-            residual: found.residual,
-        })
+        let all = vec![found.delay_s, found.natural_frequency_hz, found.damping_ratio, found.bandwidth_hz];
+        Ok((all, found.residual))
     })
 }
 
@@ -49,13 +42,9 @@ pub fn step(args: &Args) -> miette::Result<Issued> {
 pub fn tap(args: &Args) -> miette::Result<Issued> {
     const NAMES: [(&str, &str); 2] = [("mount.resonance", "Hz"), ("mount.damping_ratio", "1")];
     let model = "value = c + exp(-zeta omega t) (p cos(omega_d t) + q sin(omega_d t))";
-    run(args, &NAMES, model, |time, value| {
+    run(args, &NAMES, model, 0.0, |time, value| {
         let found = ring_down(time, value)?;
-        Ok(Event {
-            found: vec![found.frequency_hz, found.damping_ratio],
-            samples: time.len(),
-            residual: found.residual,
-        })
+        Ok((vec![found.frequency_hz, found.damping_ratio], found.residual))
     })
 }
 
@@ -63,20 +52,23 @@ fn run(
     args: &Args,
     names: &[(&str, &'static str)],
     model: &str,
+    from_s: f64,
     fit: impl Fn(&[f64], &[f64]) -> Result<Event, calibration::regression::FitError>,
 ) -> miette::Result<Issued> {
     let mut sources = Sources::default();
     let rows = columns(&mut sources, &args.samples, ["event", "time_s", "value"], &[])?;
     let shown = args.samples.display();
-    let mut events = Vec::new();
+    let mut events: Vec<Event> = Vec::new();
     for event in rows.chunk_by(|a, b| a[0] == b[0]) {
         let (time, value): (Vec<f64>, Vec<f64>) = event.iter().map(|r| (r[1], r[2])).unzip();
-        let number = event[0][0];
+        let refused = |why: &dyn std::fmt::Display| miette::miette!("{shown}: event {}: {why}", event[0][0]);
         if time.windows(2).any(|w| w[1] <= w[0]) {
-            miette::bail!("{shown}: event {number}: time_s must rise from row to row");
+            return Err(refused(&"time_s must rise from row to row"));
         }
-        let refused = |e| miette::miette!("{shown}: event {number}: no certificate: {e}");
-        events.push(fit(&time, &value).map_err(refused)?);
+        if time[0] < from_s {
+            return Err(refused(&"it begins before its tap: only the free decay after it is fitted"));
+        }
+        events.push(fit(&time, &value).map_err(|e| refused(&format!("no certificate: {e}")))?);
     }
     let mut remarks = Vec::new();
     if events.len() == 2 {
@@ -92,18 +84,18 @@ fn run(
         .enumerate()
         .map(|(k, (name, unit))| match events.as_slice() {
             // Both models have five parameters.
-            [one] => Finding::new(*name, *unit, one.found[k], one.samples as f64 - 5.0),
+            [one] => Finding::new(*name, *unit, one.0[k], rows.len() as f64 - 5.0),
             all => {
-                let values: Vec<f64> = all.iter().map(|e| e.found[k][0]).collect();
+                let values: Vec<f64> = all.iter().map(|e| e.0[k][0]).collect();
                 let mean = Input::type_a(&values);
                 Finding::new(*name, *unit, [mean.value, mean.standard_uncertainty], mean.degrees_of_freedom)
             }
         })
         .collect();
     let n = events.len() as f64;
-    let count = events.iter().map(|e| e.samples as u64).sum();
-    let sd = (events.iter().map(|e| e.residual[0].powi(2)).sum::<f64>() / n).sqrt();
-    let largest = events.iter().map(|e| e.residual[1]).fold(0.0, f64::max);
+    let count = rows.len() as u64;
+    let sd = (events.iter().map(|e| e.1[0].powi(2)).sum::<f64>() / n).sqrt();
+    let largest = events.iter().map(|e| e.1[1]).fold(0.0, f64::max);
     let residuals = Residuals { count, sd, largest, unit: "as the values".into(), lack_of_fit_p: None };
     args.common.certify(outcome(model, &findings, residuals, remarks), sources.raw_data())
 }

@@ -1,6 +1,6 @@
 //! `muprime calibrate force`.
 
-use super::tables::Sources;
+use super::tables::{Sources, with_columns};
 use super::{Bench, Common, Issued, SeriesOptions};
 use crate::say;
 use calibration::force::matrix::{Linearity, Options, fit};
@@ -76,11 +76,11 @@ pub fn certified(args: &Args, bench: &dyn Bench) -> miette::Result<Issued> {
             let text = bench.series(&options)?;
             let name = path.display().to_string();
             say!("the series is in {name}");
-            sources.add(&name, text.as_bytes());
-            (name, text.into_bytes())
+            let bytes = sources.add(&name, text.into_bytes())?;
+            (name, bytes)
         }
     };
-    has_columns(&name, &bytes)?;
+    with_columns(&name, &bytes, &["time_s", "axis", "lateral_counts", "normal_counts"])?;
     let readings = series::read(bytes.as_slice(), &weighing).map_err(|e| miette::miette!("{name}: {e}"))?;
     let options = Options {
         linearity: if args.quadratic { Linearity::Quadratic } else { Linearity::Linear },
@@ -91,20 +91,4 @@ pub fn certified(args: &Args, bench: &dyn Bench) -> miette::Result<Issued> {
     let found =
         fit(&readings, &weighing, &options).map_err(|e| miette::miette!("{name}: no certificate: {e}"))?;
     args.common.certify(found.outcome(&weighing), sources.raw_data())
-}
-
-/// The columns that no series does without are there.
-fn has_columns(name: &str, bytes: &[u8]) -> miette::Result<()> {
-    const NEEDED: [&str; 4] = ["time_s", "axis", "lateral_counts", "normal_counts"];
-    let text = String::from_utf8_lossy(bytes);
-    let head = text.lines().find(|line| !line.trim_start().starts_with('#')).unwrap_or_default();
-    let there: Vec<&str> = head.split(',').map(|column| column.trim().trim_matches('"')).collect();
-    if NEEDED.iter().all(|column| there.contains(column)) {
-        return Ok(());
-    }
-    Err(miette::miette!(
-        help = "with mass_kg or load_n as well; docs/calibration.md shows such a table",
-        "{name}: needs the columns {}; its first line is: {head}",
-        NEEDED.join(", ")
-    ))
 }

@@ -4,6 +4,7 @@ use super::tables::{Sources, columns};
 use super::{Common, Issued};
 use calibration::force::dynamics::step_response;
 use calibration::latency::{channel_delay, clock, outcome};
+use calibration::uncertainty::Input;
 use std::path::PathBuf;
 
 /// Arguments. Each file is given as CHANNEL=FILE and may be repeated.
@@ -53,11 +54,8 @@ pub fn certified(args: &Args) -> miette::Result<Issued> {
             bandwidths.push(found.bandwidth_hz[0]);
         }
         channels.push(delay(channel, &delays, given)?);
-        let n = bandwidths.len() as f64;
-        let mean = bandwidths.iter().sum::<f64>() / n;
-        let sd = (bandwidths.iter().map(|b| (b - mean).powi(2)).sum::<f64>() / (n - 1.0)).sqrt();
-        remarks
-            .push(format!("{channel}: bandwidth {mean:.2} Hz, standard uncertainty {:.2} Hz", sd / n.sqrt()));
+        let Input { value, standard_uncertainty: u, .. } = Input::type_a(&bandwidths);
+        remarks.push(format!("{channel}: bandwidth {value:.2} Hz, standard uncertainty {u:.2} Hz"));
     }
     let mut clocks = Vec::new();
     for given in &args.clock {
@@ -65,6 +63,13 @@ pub fn certified(args: &Args) -> miette::Result<Issued> {
         let rows = columns(&mut sources, &path, ["host_s", "device_s"], &[])?;
         let (host, device): (Vec<f64>, Vec<f64>) = rows.iter().map(|r| (r[0], r[1])).unzip();
         let found = clock::compare(&host, &device).map_err(|e| miette::miette!("{given}: {e}"))?;
+        if found.rate_error[0].abs() > 0.01 {
+            let rate = 1.0 + found.rate_error[0];
+            miette::bail!(
+                help = "both are in seconds, and a counter that starts over must be unwrapped",
+                "{given}: device_s rises {rate:.4} times as fast as host_s"
+            );
+        }
         remarks.push(format!(
             "{channel}: arrivals scatter by {:.2e} s about the device's clock",
             found.arrival_sd_s

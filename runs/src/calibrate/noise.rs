@@ -8,6 +8,7 @@ use calibration::force::noise::{
     EqualSamples, Spectrum, integrated_autocorrelation_time, mean_with_uncertainty,
     probability_of_equal_samples, quantum,
 };
+use std::collections::BTreeMap;
 use std::fmt::Write as _;
 use std::path::PathBuf;
 
@@ -17,7 +18,7 @@ pub struct Args {
     /// Samples at rest, every one and evenly spaced, as CSV: lateral_counts, normal_counts (whole numbers)
     samples: PathBuf,
     /// Samples per second
-    #[arg(long)]
+    #[arg(long, allow_negative_numbers = true)]
     rate_hz: f64,
     /// Samples of a segment of the spectrum (Welch, Hann, half overlapping)
     #[arg(long, default_value_t = 1024)]
@@ -30,6 +31,18 @@ pub struct Args {
     spectrum: Option<PathBuf>,
     #[command(flatten)]
     common: Common,
+}
+
+/// The end at which samples are cut off: there are more at it than anywhere, and ten times as many as at the
+/// other end. Noise has its fewest samples at the ends, and a hum as many at both.
+fn rail(samples: &[i64]) -> Option<i64> {
+    let mut counts = BTreeMap::new();
+    samples.iter().for_each(|sample| *counts.entry(*sample).or_insert(0u64) += 1);
+    let (low, high) = (counts.first_key_value()?, counts.last_key_value()?);
+    let most = counts.values().max()?;
+    let cut = |end: (&i64, &u64), other: (&i64, &u64)| end.1 == most && *end.1 > 10 * other.1;
+    let found = [(low, high), (high, low)].into_iter().find(|(end, other)| cut(*end, *other));
+    found.filter(|_| counts.len() >= 4).map(|(end, _)| *end.0)
 }
 
 /// Calibrates.
@@ -52,6 +65,11 @@ pub fn certified(args: &Args) -> miette::Result<Issued> {
             miette::bail!("{shown}, row {}: {name}_counts are whole numbers, raw as they came", row + 1);
         }
         let whole: Vec<i64> = counts.iter().map(|c| *c as i64).collect();
+        if let Some(end) = rail(&whole) {
+            miette::bail!(
+                "{shown}: {name}_counts pile up at {end}, the end of the converter's range: unload the sensor"
+            );
+        }
         let n = counts.len() as f64;
         let (Some(spectrum), Some(equal)) =
             (Spectrum::welch(&counts, args.rate_hz, args.segment), EqualSamples::of(&whole))
@@ -77,7 +95,7 @@ pub fn certified(args: &Args) -> miette::Result<Issued> {
                 .push(format!("{name}: a line at {:.2} Hz of {:.3} counts rms", line.frequency_hz, line.rms));
         }
         match quantum(&whole) {
-            None => remarks.push(format!("{name}: all samples are equal: this channel is dead or frozen")),
+            None => miette::bail!("{shown}: {name}_counts are all equal: this channel is dead or frozen"),
             Some(step) => {
                 let white = (level * args.rate_hz / 2.0).sqrt();
                 remarks.push(format!(

@@ -97,12 +97,20 @@ pub(super) fn judge(
         let [low, high] = ends(readings.iter().map(|r| r.counts[axis as usize]));
         let span = high - low;
         let drift = fit.value(axis, Term::Drift) * (end - start);
+        let variance = fit.index(axis, Term::Drift).map_or(0.0, |i| fit.type_a[(i, i)]);
+        let sd = variance.sqrt() * (end - start);
         if drift.abs() > options.zero_drift_limit * span {
             return Err(ForceError::DriftingZero {
                 axis,
                 counts: drift,
+                sd,
                 percent: 100.0 * drift.abs() / span,
                 limit: 100.0 * options.zero_drift_limit,
+                remedy: if drift.abs() > 2.0 * sd {
+                    "let it warm up, then repeat"
+                } else {
+                    "the readings scatter too much to tell a drift; find the noise, average longer, then repeat"
+                },
             });
         }
         let correlation = neighbours(fit, readings, axis);
