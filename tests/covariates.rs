@@ -97,6 +97,11 @@ fn air_that_no_rig_stands_in_is_refused_with_its_place() {
         ("temperature_c = -400.0", "temperature_c"),
         ("relative_humidity_pct = 120.0", "relative_humidity_pct"),
         ("ambient_pressure_pa = -1.0", "ambient_pressure_pa"),
+        ("ambient_pressure_pa = 0.0", "ambient_pressure_pa"),
+        ("ambient_pressure_pa = 101.3", "ambient_pressure_pa"),
+        ("ambient_pressure_pa = 1013.25e3", "ambient_pressure_pa"),
+        ("temperature_c = 295.15", "temperature_c"),
+        ("relative_humidity_pct = 0.45", "relative_humidity_pct"),
         ("speed_gain_sd = inf", "speed_gain_sd"),
     ] {
         let refused = Setup::parse("s.toml", &setup_text(stated), Path::new(".")).unwrap_err().to_string();

@@ -8,10 +8,11 @@ mod bench;
 
 pub use bench::{Answers, Bench, World};
 
-use crate::input::Problems;
+use crate::input::{Problems, unit_meant, unit_of};
 use crate::plan::{Plan, series_place};
 use crate::sequence::MeasuredPass;
 use crate::setup::{Setup, SetupFile};
+use models::condition::Condition;
 use models::covariate::{self, Covariate};
 use realtime::ports::Nanos;
 use serde::{Deserialize, Serialize};
@@ -228,6 +229,17 @@ pub fn levels_of(passes: &[MeasuredPass]) -> Vec<LevelsFound> {
     all
 }
 
+/// Values that air around a rig can have: none in kPa, in kelvin or as a share passes for one in Pa, deg C or
+/// per cent. Below 1 % a hygrometer shows nothing.
+pub(crate) fn possible(covariate: &Covariate) -> [f64; 2] {
+    match covariate.name {
+        "ambient_pressure_pa" => [200.0, 200_000.0],
+        "temperature_c" => [-40.0, 100.0],
+        "relative_humidity_pct" => [1.0, 100.0],
+        _ => covariate.range,
+    }
+}
+
 impl SetupFile {
     /// Who sets and reads each quantity on this setup; `None` where nobody sets it.
     pub fn means(&self) -> OfAir<Option<Means>> {
@@ -253,6 +265,16 @@ impl SetupFile {
                 let names = AIR.map(|(covariate, _)| covariate.name).join(", ");
                 let problem = format!("'{name}' is not a quantity of the air; there are {names}");
                 wrong.add(&["ambient", "by_operator"], problem, None);
+            }
+        }
+        let air = Condition::paper().within(&self.stated_air());
+        for (c, _) in AIR {
+            let [low, high] = possible(c);
+            if let Some(value) = c.of(&air).filter(|v| !(low..=high).contains(v)) {
+                let remedy = unit_meant(c.name, value, [low, high]);
+                let unit = unit_of(c.name);
+                let problem = format!("{} = {value}: {low} to {high} {unit} is needed", c.name);
+                wrong.add(&[c.name], problem, remedy);
             }
         }
         let Some(chamber) = &self.chamber else { return };

@@ -145,6 +145,14 @@ pub fn unit_of(key: &str) -> &'static str {
 pub fn unit_meant(key: &str, value: f64, [low, high]: [f64; 2]) -> Option<String> {
     let unit = unit_of(key);
     let within = |v: f64| v.is_finite() && v.abs() >= low && v.abs() <= high;
+    let other = match unit {
+        "deg C" => (value - 273.15, "K"),
+        "%" => (100.0 * value, "a share"),
+        _ => (f64::NAN, ""),
+    };
+    if value > 0.0 && !within(value) && within(other.0) {
+        return Some(format!("{} meant? Then write {}", other.1, rounded(other.0, 6)));
+    }
     // Nobody writes thousandths of a per cent, of a degree or of arbitrary units.
     if matches!(unit, "" | "%" | "a.u." | "deg C") || value == 0.0 || within(value) {
         return None;
@@ -451,6 +459,9 @@ mod tests {
         for (key, value) in [("frequency_hz", 5000.0), ("radius_m", 0.05), ("speed_m_s", 0.05)] {
             assert_eq!(of(key, value), None, "{key}");
         }
+        let air = |key, value, range| unit_meant(key, value, range).unwrap();
+        assert_eq!(air("temperature_c", 295.15, [-40.0, 100.0]), "K meant? Then write 22");
+        assert_eq!(air("relative_humidity_pct", 0.45, [1.0, 100.0]), "a share meant? Then write 45");
         for key in ["relative_humidity_pct", "skin_moisture_au", "temperature_c"] {
             assert_eq!(of(key, 5000.0), None, "{key}");
         }

@@ -16,7 +16,6 @@ use crate::plan::{LateralChannel, Reach};
 use drivers::vibrometer::VibrometerSetup;
 use drivers::{InstrumentSetup, InstrumentsSetup};
 use models::condition::Ambient;
-use models::covariate;
 use models::rig_file::{PassNoise, RigFile, RigFileError};
 use realtime::cycle::Config;
 use realtime::estimate::EstimateConfig;
@@ -286,13 +285,6 @@ impl Setup {
             && let Err(problem) = sim::world::World::new(&rig.world(), rig.finger_seed)
         {
             wrong.add(&["virtual", "ridge_table_strokes"], problem.to_string(), None);
-        }
-        let air = models::condition::Condition::paper().within(&file.stated_air());
-        for c in covariate::OPTIONAL {
-            if let Some(value) = c.of(&air).filter(|v| !c.admits(*v)) {
-                let remedy = unit_meant(c.name, value, c.range);
-                wrong.add(&[c.name], format!("{} = {value}: {} is needed", c.name, c.needed), remedy);
-            }
         }
         let tip = Fingertip::resolve(&file.finger, folder);
         let tip = tip.map_err(|problem| wrong.add(&["finger", tip_key(text, &problem)], problem, None)).ok();

@@ -270,14 +270,9 @@ fn allowed(covariate: &Covariate, limits: &Limits) -> [f64; 2] {
         "speed_m_s" => [f64::MIN_POSITIVE, limits.speed_max_m_s],
         "normal_force_n" => [f64::MIN_POSITIVE, limits.normal_force_max_n],
         "position_m" => [limits.travel_m.0, limits.travel_m.1],
-        "ambient_pressure_pa" => CHAMBER_PA,
-        _ => covariate.range,
+        _ => crate::ambient::possible(covariate),
     }
 }
-
-/// Pressures that a plan may ask a chamber for, Pa. The least is what the largest would be if it were
-/// written in kPa, so that no value in kPa passes for one in Pa.
-const CHAMBER_PA: [f64; 2] = [200.0, 200_000.0];
 
 pub(crate) fn series_place(text: &str, index: usize, name: &str) -> Option<Range<usize>> {
     let table = toml::de::DeTable::parse(text).ok()?;

@@ -10,7 +10,7 @@
 //! ([`crate::ambient::Bench`]); this file only decides, so it runs in virtual time as in wall-clock time.
 
 use super::{Event, Outcome, QUIET_WITHIN, Reaction, STANDS_M_S, Sequence, Stage, Sums, awake};
-use crate::ambient::{AIR, By, Found, Level, Means, OfAir, Source, shown};
+use crate::ambient::{AIR, By, Found, Level, Means, OfAir, Source, possible, shown};
 use crate::plan::{Step, When};
 use models::condition::{Ambient, Condition};
 use realtime::cycle::{Command, Phase};
@@ -402,7 +402,10 @@ impl Sequence {
             return self.next_task(row, out);
         }
         let fits = match (&task, number) {
-            (Task::Level(at, _), Some(v)) if needs => AIR[*at].0.admits(v),
+            (Task::Level(at, _), Some(v)) if needs => {
+                let [low, high] = possible(AIR[*at].0);
+                (low..=high).contains(&v)
+            }
             (_, number) => !needs || number.is_some(),
         };
         if !fits {
