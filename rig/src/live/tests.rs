@@ -38,6 +38,7 @@ fn pass(point: u64) -> MeasuredPass {
         regime: None,
         psi_eq17: None,
         temperature_flags: Vec::new(),
+        commanded_normal_force_n: None,
         levels: Vec::new(),
     }
 }

@@ -91,6 +91,7 @@ fn pass(point: u64, amplitude_um: f64, measured: Option<f64>, predicted: f64) ->
         regime: None,
         psi_eq17: None,
         temperature_flags: Vec::new(),
+        commanded_normal_force_n: None,
         levels: Vec::new(),
     }
 }

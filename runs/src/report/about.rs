@@ -32,13 +32,29 @@ impl<'a> Remarked<'a> {
     }
 }
 
-/// What a reader of the passes must know. Without a pass without vibration the loop has `mu_0` from the
-/// model, and the record has it: the measured values then contain the model.
+/// What a reader of the passes must know: what `mu_0` is, and a load that all of them missed. Without a pass
+/// without vibration the loop has `mu_0` from the model, and the record has it: the measured values then
+/// contain the model.
 pub fn remarks(passes: &[MeasuredPass]) -> Vec<String> {
     let refers = |p: &MeasuredPass| p.pass.amplitude == PeakToPeak::ZERO && p.pass.lateral_force_n.is_some();
     let measured = passes.iter().any(|p| p.comparison.is_some_and(|c| c.mu_relative.is_some()));
     let rests = measured && !passes.iter().any(refers);
-    rests.then(|| NO_REFERENCE.to_string()).into_iter().collect()
+    rests.then(|| NO_REFERENCE.to_string()).into_iter().chain(load_missed(passes)).collect()
+}
+
+/// The remark of a run whose passes all had a fifth more, or all a fifth less, than the commanded load. SR-43
+/// does not see it of a light touch.
+fn load_missed(passes: &[MeasuredPass]) -> Option<String> {
+    let share = |p: &MeasuredPass| Some(p.pass.normal_force_n / p.commanded_normal_force_n? - 1.0);
+    let shares = passes.iter().map(share).collect::<Option<Vec<f64>>>().filter(|all| !all.is_empty())?;
+    let missed = shares.iter().all(|s| *s > 0.2) || shares.iter().all(|s| *s < -0.2);
+    let mean = 100.0 * shares.iter().sum::<f64>() / shares.len() as f64;
+    missed.then(|| {
+        format!(
+            "all passes missed the commanded load, by {mean:+.0} % on average: check `factor` and unit of the normal force, its \
+             `gain` or certificate, and what applies the load"
+        )
+    })
 }
 
 /// The remark of a run without references.
@@ -112,4 +128,37 @@ pub fn of_rig(rig: &RigFile) -> Vec<(&'static str, String)> {
         ("repeatability", format!("{share:.1} % of the force and {force_mn:.2} mN, as stated")),
         ("certificates", none.unwrap_or_else(|| files.join(", "))),
     ]
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use models::condition::Condition;
+    use models::pass::Pass;
+
+    /// Half of the load in every pass, by a wrong factor: the run was complete and nothing remarked it.
+    #[test]
+    fn a_load_that_every_pass_missed_is_remarked_and_one_that_some_missed_is_not() {
+        let of = |found: &[f64], commanded: Option<f64>| {
+            let pass = |normal_force_n: &f64| MeasuredPass {
+                pass: Pass::at(1, &Condition { normal_force_n: *normal_force_n, ..Condition::paper() }, None),
+                reference: false,
+                comparison: None,
+                regime: None,
+                psi_eq17: None,
+                temperature_flags: Vec::new(),
+                commanded_normal_force_n: commanded,
+                levels: Vec::new(),
+            };
+            remarks(&found.iter().map(pass).collect::<Vec<_>>()).join("\n")
+        };
+        let half = of(&[0.12, 0.13], Some(0.25));
+        assert!(half.contains("missed the commanded load, by -50 % on average: check `factor`"), "{half}");
+        assert!(of(&[0.5, 0.6], Some(0.25)).contains("+120 %"));
+        for (found, commanded) in
+            [(&[0.12, 0.24][..], Some(0.25)), (&[0.12, 0.4], Some(0.25)), (&[0.12], None), (&[], Some(0.25))]
+        {
+            assert_eq!(of(found, commanded), "", "{found:?}");
+        }
+    }
 }

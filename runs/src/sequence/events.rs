@@ -27,6 +27,9 @@ pub struct MeasuredPass {
     /// it.
     #[serde(default, skip_serializing_if = "Vec::is_empty")]
     pub temperature_flags: Vec<TemperatureFlag>,
+    /// Load that was commanded, in N; `None` where the rig commands none (dead weights).
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub commanded_normal_force_n: Option<f64>,
     /// What was found of the air and typed at the rig, by whom and how old.
     #[serde(default, skip_serializing_if = "Vec::is_empty")]
     pub levels: Vec<Level>,

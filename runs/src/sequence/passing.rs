@@ -100,7 +100,9 @@ impl Sequence {
             wanted,
             range: level.range,
         }));
-        let measured = MeasuredPass { levels, ..self.compare(pass, point.reference) };
+        let commanded_normal_force_n = self.load_commanded.then_some(point.condition.normal_force_n);
+        let measured =
+            MeasuredPass { levels, commanded_normal_force_n, ..self.compare(pass, point.reference) };
         if let Some(comparison) = &measured.comparison {
             if let Some(mu0) = self.comparator.mu0() {
                 out.commands.push(Command::Mu0(mu0));
@@ -184,8 +186,15 @@ impl Sequence {
         let known = self.comparator.mu0().filter(|_| condition.amplitude > PeakToPeak::ZERO);
         let psi_eq17 =
             known.map(|m| PsiEq17::at(&Condition { mu0: m.value, ..condition }, self.poisson_ratio).0);
-        let temperature_flags = self.temperature_flags.clone();
-        let levels = Vec::new();
-        MeasuredPass { pass, reference, comparison, regime, psi_eq17, temperature_flags, levels }
+        MeasuredPass {
+            pass,
+            reference,
+            comparison,
+            regime,
+            psi_eq17,
+            temperature_flags: self.temperature_flags.clone(),
+            commanded_normal_force_n: None,
+            levels: Vec::new(),
+        }
     }
 }
