@@ -7,15 +7,17 @@ mod compile;
 mod computed;
 mod fits;
 mod frame;
+mod quantities;
 mod sets;
 
 use crate::codec::dbc::DbcSignal;
 use crate::error::ProfileError;
 use crate::expression::Expression;
-use crate::field::Field;
+use crate::field::{Field, NumberType};
 use crate::schema::{Description, Severity};
 use compile::Compiler;
 pub use frame::{Frame, FrameKind, MOST_REGISTERS, Part, Span};
+pub use quantities::power_of_ten;
 use sets::CompiledSet;
 pub use sets::SetError;
 use std::collections::HashMap;
@@ -124,6 +126,17 @@ pub(crate) struct CompiledSignal {
     resolution_si: Option<f64>,
     /// The smallest change of what stands in the frame, before `scale`; NaN where nobody knows it.
     step: f64,
+}
+
+impl CompiledSignal {
+    /// Whether what stands in the frame is a whole number.
+    fn has_counts(&self) -> bool {
+        match &self.place {
+            Place::Bytes(Field { bits: None, number: NumberType::F32 | NumberType::F64, .. }) => false,
+            Place::Dbc(_, signal) => !signal.float,
+            Place::Bytes(_) | Place::Computed(_) => true,
+        }
+    }
 }
 
 /// An instrument's description, ready for use.
@@ -281,6 +294,16 @@ impl Profile {
         }
     }
 
+    /// Whether [`Profile::raw`] is a number of steps of the signal: a float has no counts.
+    pub fn has_counts(&self, signal: SignalId) -> bool {
+        let signal = &self.signals[signal.0];
+        let inputs = || self.inputs(signal.frame).into_iter().all(|i| self.signals[i].has_counts());
+        match signal.place {
+            Place::Computed(_) => signal.resolution_si.is_some() || inputs(),
+            _ => signal.has_counts(),
+        }
+    }
+
     /// Gives the set-point of that name, or else the signal, another way to SI: a certificate's.
     pub fn set_si(&mut self, name: &str, factor: f64) {
         match self.description.set.iter_mut().find(|set| set.name.as_ref() == name) {
@@ -342,6 +365,14 @@ impl Profile {
         };
         let beyond = railed(signal, value) || self.signals.iter().zip(values.as_slice()).any(input);
         beyond.then_some(Refusal::OutOfRange)
+    }
+
+    /// A condition of the profile with what was read of its signals: `model == 4712` (model = 4711).
+    pub fn shown(&self, when: &str, values: &Values) -> String {
+        let words: Vec<&str> = when.split(|c: char| !(c.is_alphanumeric() || c == '_')).collect();
+        let read = self.signals().filter(|(name, _)| words.contains(name));
+        let read: Vec<String> = read.map(|(name, id)| format!("{name} = {}", values.get(id))).collect();
+        format!("`{when}` ({})", read.join(", "))
     }
 
     /// The first signature that does not hold, by index into the description.

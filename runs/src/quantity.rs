@@ -1,20 +1,6 @@
 //! Quantities on the command line: `2um`, `27.5kHz`, `20mm/s`, `500mN`, or the bare number in SI.
 
-const PREFIXES: [(&str, i32); 9] =
-    [("", 0), ("n", -9), ("u", -6), ("\u{b5}", -6), ("\u{3bc}", -6), ("m", -3), ("k", 3), ("M", 6), ("G", 9)];
-
-/// The power of ten that `written`, such as `mm/s`, has over the SI unit, such as `m/s`.
-fn power(written: &str, unit: &str) -> Option<i32> {
-    let one = |written: &str, unit: &str| {
-        let fits = |(prefix, _): &&(&str, i32)| written.strip_prefix(prefix) == Some(unit);
-        PREFIXES.iter().find(fits).map(|(_, power)| *power)
-    };
-    match (written.split_once('/'), unit.split_once('/')) {
-        (Some((above, below)), Some((of, per))) => Some(one(above, of)? - one(below, per)?),
-        (None, None) => one(written, unit),
-        _ => None,
-    }
-}
+use instruments::profile::power_of_ten;
 
 /// The text with a point, where it has one decimal comma.
 pub(crate) fn with_point(text: &str) -> Option<String> {
@@ -34,7 +20,7 @@ pub fn parse(text: &str, unit: &str) -> Result<f64, String> {
         let (number, written) = text.split_at(at);
         // In decimal digits, so that 2um is the very number that 2e-6 is.
         let number = number.trim();
-        let power = power(written.trim(), unit)?;
+        let power = power_of_ten(written.trim(), unit)?;
         number.parse::<f64>().ok()?;
         match number.to_ascii_lowercase().split_once('e') {
             None => format!("{number}e{power}").parse().ok(),

@@ -49,6 +49,8 @@ pub struct DbcMessage {
     pub length: usize,
     /// Signals by name.
     pub signals: HashMap<String, DbcSignal>,
+    /// Their units, where the file states them.
+    pub units: HashMap<String, String>,
     /// What is wrong with it, with the line: nobody may use it.
     pub fault: Option<DbcError>,
 }
@@ -213,8 +215,9 @@ fn one(dbc: &can_dbc::Dbc, message: &can_dbc::Message, begins: &Beginning) -> Db
             Err(why) => fault = fault.or(Some(why)),
         }
     }
+    let units = message.signals.iter().map(|signal| (signal.name.clone(), signal.unit.clone())).collect();
     let (id, extended) = id.unwrap_or((u32::MAX, true));
-    DbcMessage { id, extended, length, signals, fault }
+    DbcMessage { id, extended, length, signals, units, fault }
 }
 
 fn place(

@@ -48,18 +48,15 @@ impl Compiler<'_> {
         self.check_reads(&frames)?;
         let signal = |s| self.signal(s, &frames, &messages, &sheet, &index);
         let signals = d.signal.iter().map(signal).collect::<Result<Vec<_>, _>>()?;
-        let sets = d.set.iter().map(|s| self.set(s, &sheet)).collect::<Result<_, _>>()?;
+        let sets = d.set.iter().map(|s| self.set(s, &sheet)).collect::<Result<Vec<_>, _>>()?;
         let condition = |when: &toml::Spanned<String>| {
             Expression::compile(when.as_ref(), &index).map_err(|why| self.at(when.span(), why))
         };
         let signatures = d.signature.iter().map(|s| condition(&s.when)).collect::<Result<_, _>>()?;
         let faults = d.fault.iter().map(|f| condition(&f.when)).collect::<Result<_, _>>()?;
-        for set in &d.set {
-            if let Some(echo) = set.echo.as_ref().filter(|echo| index(echo).is_none()) {
-                let name = set.name.as_ref();
-                let message = format!("the echo of set-point `{name}`, `{echo}`, is not a signal");
-                return Err(self.at_name(&set.name, message));
-            }
+        for (set, compiled) in d.set.iter().zip(&sets) {
+            let echo = set.echo.as_deref().and_then(index).map(|at| &signals[at]);
+            self.check_echo(set, compiled, echo, &frames)?;
         }
         self.check_emulator(&index)?;
         self.check_frames(&frames, &signals)?;
@@ -324,8 +321,16 @@ impl Compiler<'_> {
         if let Place::Bytes(field) = &place {
             self.check_field(field, frames[frame].bytes, &s.name)?;
         }
-        if s.scale == 0.0 || !s.scale.is_finite() || !s.si.factor.is_finite() || s.si.factor == 0.0 {
-            return Err(wrong(format!("a scale of signal `{name}` is zero or not finite")));
+        let scales = [s.scale, s.si.factor];
+        if scales.contains(&0.0) || !scales.iter().chain([&s.offset]).all(|x| x.is_finite()) {
+            return Err(wrong(format!("a scale or the offset of signal `{name}` is zero or not finite")));
+        }
+        self.check_unit(&s.name, &s.unit, s.si.factor, &s.si)?;
+        if let (Some((message, signal)), None) =
+            (s.dbc.as_deref().and_then(|d| d.split_once('.')), &s.scale_expr)
+            && let Some(unit) = messages.get(message).and_then(|m| m.units.get(signal))
+        {
+            self.check_unit(&s.name, unit, s.scale * s.si.factor, &s.si)?;
         }
         if s.range.is_some_and(|(low, high)| low >= high || low.is_nan() || high.is_nan()) {
             return Err(wrong(format!("the range of signal `{name}` is empty")));
@@ -434,16 +439,7 @@ impl Compiler<'_> {
     fn set(&self, s: &crate::schema::Set, sheet: &Objects) -> Result<CompiledSet, ProfileError> {
         let name = s.name.as_ref();
         let wrong = |why: String| self.at_name(&s.name, why);
-        if s.scale == 0.0 || !s.scale.is_finite() {
-            return Err(wrong(format!("the scale of set-point `{name}` is zero or not finite")));
-        }
-        if s.range.is_some_and(|(low, high)| low > high || low.is_nan() || high.is_nan()) {
-            return Err(wrong(format!("the range of set-point `{name}` is empty")));
-        }
-        let outside = |safe: f64| s.range.is_some_and(|(low, high)| safe < low || safe > high);
-        if s.safe.is_some_and(outside) {
-            return Err(wrong(format!("the safe value of set-point `{name}` lies outside its range")));
-        }
+        self.check_set(s)?;
         if let Some(send) = &s.send {
             return Ok(CompiledSet { block: None, scale: s.scale, line: Some(self.sent_line(s, send)?) });
         }
@@ -498,7 +494,9 @@ impl Compiler<'_> {
             })
         };
         let owners = pattern.fields().map(owner).collect::<Result<Vec<_>, _>>()?;
-        if !owners.is_empty() && !owners.contains(&None) {
+        // A heartbeat alone may be the same whatever its value.
+        let alike = s.send_zero.as_ref().is_none_or(|zero| zero == send) && name != "heartbeat";
+        if !owners.contains(&None) && (alike || !owners.is_empty()) {
             return Err(wrong(format!("the line of set-point `{name}` has no `{{}}` for its own value")));
         }
         Ok((pattern, owners))

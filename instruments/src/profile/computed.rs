@@ -64,7 +64,7 @@ impl Profile {
     }
 
     /// The numbers of a frame that computed signals may be made of: those with a range, its converters' readings.
-    fn inputs(&self, frame: FrameId) -> Vec<usize> {
+    pub(super) fn inputs(&self, frame: FrameId) -> Vec<usize> {
         let signals = self.signals.iter().enumerate();
         let reads = |s: &super::CompiledSignal| {
             s.frame == frame && s.range.is_some() && !matches!(s.place, Place::Computed(_))

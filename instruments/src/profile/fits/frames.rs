@@ -35,13 +35,6 @@ impl Compiler<'_> {
                 "needs either `once = true` or a `rate_hz` above 0 and at most {FASTEST_HZ}"
             ));
         }
-        for signal in poll.sequence.iter().chain(&poll.device_time) {
-            let here = |frame: &Option<String>| frame.as_ref().is_none_or(|frame| frame == name);
-            if !self.description.signal.iter().any(|s| s.name.as_ref() == signal && here(&s.frame)) {
-                let why = format!("`{signal}` of poll `{name}` is not a signal in it");
-                return self.refuse_named(&poll.name, why);
-            }
-        }
         Ok(())
     }
 
@@ -132,20 +125,30 @@ impl Compiler<'_> {
     ) -> Result<(), ProfileError> {
         let d = self.description;
         for (index, frame) in frames.iter().enumerate() {
-            let named = match &frame.kind {
-                FrameKind::Stream => d.stream.as_ref().and_then(|stream| stream.sequence.as_ref()),
-                FrameKind::Messages(group, _) => d.message[*group].sequence.as_ref(),
-                FrameKind::Poll(_) | FrameKind::Query(_) => None,
+            let (counter, clock) = match &frame.kind {
+                FrameKind::Stream => (d.stream.as_ref().and_then(|stream| stream.sequence.as_ref()), None),
+                FrameKind::Messages(group, _) => (d.message[*group].sequence.as_ref(), None),
+                FrameKind::Poll(poll) => {
+                    (d.poll[*poll].sequence.as_ref(), d.poll[*poll].device_time.as_ref())
+                }
+                FrameKind::Query(_) => (None, None),
             };
-            let stands = |name: &str| {
+            let placed = |name: &str| {
                 let own = |signal: &CompiledSignal| {
                     signal.frame.0 == index && !matches!(signal.place, Place::Computed(_))
                 };
-                d.signal.iter().zip(signals).any(|(signal, s)| own(s) && signal.name.as_ref() == name)
+                d.signal.iter().zip(signals).find(|(signal, s)| own(s) && signal.name.as_ref() == name)
             };
-            if let Some(name) = named.filter(|name| !stands(name)) {
-                let why = format!("`sequence` of `{}`: `{name}` is not a signal in it", frame.name);
-                return self.refuse(&format!("\"{name}\""), why);
+            let stands = |name: &str| placed(name).is_some();
+            // A number in a line of text is stored as a float.
+            let counts =
+                |name: &str| placed(name).is_some_and(|(_, s)| frame.text.is_some() || s.has_counts());
+            let wrong_counter = counter.filter(|name| !counts(name)).map(|name| ("sequence", name));
+            let wrong_clock = clock.filter(|name| !stands(name)).map(|name| ("device_time", name));
+            if let Some((key, name)) = wrong_counter.or(wrong_clock) {
+                let what = if stands(name) { "a float, which counts nothing" } else { "not a signal in it" };
+                let why = format!("`{key}` of `{}`: `{name}` is {what}", frame.name);
+                return self.refuse(&format!("{key} = \"{name}\""), why);
             }
             if let Some(crate::codec::text::Form::Pattern(pattern)) = &frame.text
                 && let Some((name, _)) = pattern.fields().find(|(name, _)| !stands(name))

@@ -1,0 +1,100 @@
+//! What a profile says twice must agree: units and factors, set-points and their echoes, 'off' and zero.
+
+use muprime_instruments::Profile;
+
+const FORCE: &str = include_str!("../../drivers/profiles/muprime-force2.toml");
+const AMPLIFIER: &str = include_str!("../../drivers/profiles/muprime-amplifier.toml");
+const STAGE: &str = include_str!("../../drivers/profiles/muprime-stage.toml");
+const RELAY: &str = include_str!("../../drivers/profiles/muprime-relay.toml");
+const WORDS: &str = include_str!("../../docs/profiles/ascii-generator.toml");
+const LINES: &str = include_str!("../../drivers/profiles/piezodrive-pdus210.toml");
+const CAN: &str = include_str!("../../docs/profiles/can-force.toml");
+const DBC: &str = include_str!("../../docs/profiles/can-force.dbc");
+
+/// The profile with `from` replaced by `to` in the table of that name; what is said of it.
+fn said(text: &str, table: &str, from: &str, to: &str) -> String {
+    let at = text.find(table).unwrap_or_else(|| panic!("`{table}` is not there"));
+    let rest = &text[at..];
+    assert!(rest.contains(from), "`{from}` is not in `{table}`");
+    let changed = format!("{}{}", &text[..at], rest.replacen(from, to, 1));
+    let read = Profile::parse_with(&changed, &|_| Some(DBC.to_string()));
+    read.err().map(|error| error.to_string()).unwrap_or_default()
+}
+
+fn each_is_refused(cases: &[(&str, &str, &str, &str, &str)]) {
+    for (text, table, from, to, cause) in cases {
+        let why = said(text, table, from, to);
+        assert!(why.contains(cause), "{table} {to}: {why:?}");
+        assert!(why.starts_with("line "), "{table} {to} has no place: {why}");
+        assert_eq!(said(text, table, from, from), "", "unchanged");
+    }
+}
+
+/// A value that switches on, or moves, is sent at every end and by `doctor`.
+#[test]
+fn off_is_zero() {
+    let set = |name: &str| format!("[[set]]\nname = \"{name}\"");
+    let (enable, amplitude) = (set("enable"), set("amplitude"));
+    let (velocity, load, closed) = (set("velocity"), set("load"), set("closed"));
+    each_is_refused(&[
+        (AMPLIFIER, &enable, "safe = 0.0", "safe = 1.0", "off is 0"),
+        (AMPLIFIER, &enable, "safe = 0.0", "safe = nan", "range"),
+        (AMPLIFIER, &amplitude, "safe = 0.0", "safe = 5.0", "off is 0"),
+        (STAGE, &velocity, "safe = 0.0", "safe = 20.0", "off is 0"),
+        (STAGE, &load, "safe = 0.0", "safe = 1.0", "off is 0"),
+        (RELAY, &closed, "safe = 0.0", "safe = 1.0", "off is 0"),
+        // One line for every value switches nothing off.
+        (LINES, &enable, "send_zero = \"DISABLE\"", "", "own value"),
+        (LINES, &enable, "send_zero = \"DISABLE\"", "send_zero = \"ENABLE\"", "own value"),
+    ]);
+}
+
+#[test]
+fn words_of_a_set_point_and_its_echo_agree() {
+    each_is_refused(&[
+        (WORDS, "name = \"enable\"", "{:OFF|ON}", "{:ON|OFF}", "`ON`"),
+        (WORDS, "name = \"state\"", "{output_on:OFF|ON}", "{output_on:ON|OFF}", "`OFF`"),
+    ]);
+    let both = WORDS.replace("{output_on:OFF|ON}", "{output_on:ON|OFF}");
+    assert!(said(&both, "name = \"enable\"", "{:OFF|ON}", "{:ON|OFF}").contains("`ON`"));
+    // A word that means its opposite has another way.
+    let muted = "send = \"MUTE=OFF\"\nsend_zero = \"MUTE=ON\"";
+    assert_eq!(said(WORDS, "name = \"enable\"", "send = \"OUT={:OFF|ON}\"", muted), "");
+}
+
+#[test]
+fn units_and_factors_agree() {
+    let (newton, nano) = ("factor = 1.0, unit = \"N\"", "factor = 1e-9, unit = \"m\"");
+    let drive = "[[set]]\nname = \"amplitude\"";
+    each_is_refused(&[
+        (FORCE, "name = \"lateral\"", "unit = \"N\"", "unit = \"mN\"", "1e-3 N"),
+        (FORCE, "name = \"lateral\"", newton, "factor = 1.0, unit = \"mN\"", "prefix"),
+        (FORCE, "name = \"lateral\"", "unit = \"N\"", "unit = \"g\"", "9.80665e-3 N"),
+        (FORCE, "name = \"lateral\"", newton, "factor = nan, unit = \"N\"", "not finite"),
+        (AMPLIFIER, drive, nano, "factor = 1e-6, unit = \"m\"", "1e-9 m"),
+        (AMPLIFIER, drive, nano, "factor = 1.0, unit = \"Hz\"", "unit = \"m\""),
+        (AMPLIFIER, drive, nano, "factor = 0.0, unit = \"m\"", "above zero"),
+        (AMPLIFIER, drive, nano, "factor = nan, unit = \"m\"", "above zero"),
+        (AMPLIFIER, drive, nano, "factor = -1e-9, unit = \"m\"", "above zero"),
+        (AMPLIFIER, drive, "echo_amplitude", "echo_frequency", "its echo `echo_frequency` in `Hz`"),
+        (STAGE, "[[signal]]\nname = \"position\"", nano, "factor = 1e-3, unit = \"m\"", "1e-9 m"),
+        (CAN, "name = \"lateral\"", "factor = 1e-3", "factor = 1.0", "1e-3 N"),
+    ]);
+    // The DBC file states a unit of its own.
+    let whole = CAN.replace("\"mN\"", "\"N\"").replace("factor = 1e-3", "factor = 1.0");
+    let why = said(&whole, "[profile]", "[profile]", "[profile]");
+    assert!(why.contains("1 mN is 1e-3 N"), "{why}");
+}
+
+/// A float's bits are no counts; neither are those of a number in a line of text.
+#[test]
+fn what_has_counts() {
+    let counts = |text: &str, signal: &str| {
+        let profile = Profile::parse_with(text, &|_| Some(DBC.to_string())).unwrap();
+        profile.has_counts(profile.signal(signal).unwrap())
+    };
+    assert!(counts(FORCE, "lateral") && counts(CAN, "lateral"));
+    assert!(!counts(WORDS, "echo_amplitude"));
+    assert!(!counts(include_str!("../../docs/profiles/strain-amp.toml"), "lateral"));
+    assert!(counts(include_str!("../../drivers/profiles/ati-digital-ft.toml"), "fx"));
+}
