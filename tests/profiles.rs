@@ -123,7 +123,7 @@ fn a_float_sensor_is_judged_by_its_stated_resolution_or_not_by_its_count() {
         let setup = setup_with("amp.toml", "127.0.0.1:1502");
         let setup =
             runs::setup::Setup::parse("own", &setup, folder.path()).unwrap_or_else(|e| panic!("{e:?}"));
-        setup.lateral_channel().unwrap().unwrap().count_n
+        setup.lateral_channel().unwrap().count_n
     };
     assert_eq!(count(&text), Some(2e-4));
     let unstated: Vec<&str> = text.lines().filter(|line| !line.starts_with("resolution_si")).collect();

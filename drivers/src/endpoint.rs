@@ -11,7 +11,7 @@ use super::mailbox::Mailbox;
 use super::ports::{self, AmplifierPort, ContactsPort, ForcePort, SetPoint, StagePort, States, SupplyPort};
 use super::setup::{AxisSetup, CONTACTS, InstrumentSetup, SetupError};
 use super::timebase::{Counter, DeviceClock, Step};
-use instruments::schema::Stamp;
+use instruments::schema::{Severity, Stamp};
 use instruments::{FrameId, Profile, SetId, SignalId, Values};
 use models::quantity::PeakToPeak;
 pub use orders::Due;
@@ -156,6 +156,8 @@ pub struct Endpoint {
     part: Part,
     orders: Orders,
     alarm_until: Nanos,
+    /// The fault that stops the rig and that it reports now, by its place in the profile.
+    fault: Option<usize>,
     arrived: Nanos,
     /// What a sensor shows is not handed on yet: it is not set up.
     held: bool,
@@ -186,6 +188,13 @@ impl Endpoint {
         let (lateral, normal) = (axis(&setup.lateral, "lateral")?, axis(&setup.normal, "normal")?);
         if lateral.is_none() && normal.is_none() {
             return Err(SetupError::NoAxis { known: signals(&profile) });
+        }
+        if let (Some(one), Some(other)) = (&lateral, &normal)
+            && one.signal.0 == other.signal.0
+        {
+            return Err(SetupError::OneSignal(
+                setup.normal.as_ref().map_or("normal".into(), |a| a.signal.clone()),
+            ));
         }
         let axes = (lateral.is_some(), normal.is_some());
         let (ring, port) = ports::sensor(Forces::missing(NoData::NeverRead));
@@ -294,6 +303,7 @@ impl Endpoint {
             part,
             orders: Orders::of(commands),
             alarm_until: Nanos(0),
+            fault: None,
             arrived: Nanos(0),
             held: false,
             health: Arc::default(),
@@ -338,11 +348,17 @@ impl Endpoint {
         {
             self.health.count(&self.health.corrupt_frames);
             let signature = &self.profile.description.signature[broken];
-            return Err(BadFrame::WrongInstrument(format!(
-                "{} (`{}` does not hold)",
-                signature.text,
-                signature.when.as_ref()
-            )));
+            let shown = self.profile.shown(signature.when.as_ref(), &self.values);
+            return Err(BadFrame::WrongInstrument(format!("{}: {shown} does not hold", signature.text)));
+        }
+        let stops = |index: &usize| self.profile.description.fault[*index].severity == Severity::Stop;
+        let fault = self.profile.fault(&self.values).filter(stops);
+        if fault != self.fault {
+            self.fault = fault;
+            let fault = fault.map(|index| &self.profile.description.fault[index]);
+            self.health.fault(fault.map_or_else(String::new, |fault| {
+                format!("{}: {}", fault.text, self.profile.shown(fault.when.as_ref(), &self.values))
+            }));
         }
         let Some(mark) = self.mark(frame, arrived) else { return Ok(()) };
         self.publish(frame, bytes, mark);

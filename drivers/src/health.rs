@@ -11,6 +11,7 @@ macro_rules! counters {
         pub struct Health {
             $($(#[$doc])* pub $name: AtomicU64,)+
             last_problem: Mutex<String>,
+            fault: Mutex<String>,
         }
 
         /// The counters at one moment.
@@ -19,14 +20,18 @@ macro_rules! counters {
             $($(#[$doc])* pub $name: u64,)+
             /// The latest problem in words; empty where there was none.
             pub last_problem: String,
+            /// The fault that the instrument reports now, in its profile's words; empty for none.
+            pub fault: String,
         }
 
         impl Health {
             /// The counters now.
             pub fn report(&self) -> HealthReport {
+                let words = |of: &Mutex<String>| of.lock().unwrap_or_else(PoisonError::into_inner).clone();
                 HealthReport {
                     $($name: self.$name.load(Ordering::Relaxed),)+
-                    last_problem: self.last_problem.lock().unwrap_or_else(PoisonError::into_inner).clone(),
+                    last_problem: words(&self.last_problem),
+                    fault: words(&self.fault),
                 }
             }
         }
@@ -70,6 +75,11 @@ impl Health {
     /// One more.
     pub fn count(&self, counter: &AtomicU64) {
         counter.fetch_add(1, Ordering::Relaxed);
+    }
+
+    /// Keeps the fault that the instrument reports now; empty for none.
+    pub fn fault(&self, text: String) {
+        *self.fault.lock().unwrap_or_else(PoisonError::into_inner) = text;
     }
 
     /// Keeps the latest problem in words.

@@ -61,7 +61,9 @@ pub fn exception(code: u8) -> String {
 /// What to look at after a problem: the words of the problem say which of the causes it is.
 pub fn advice(problem: &str) -> &'static str {
     let has = |words: &str| problem.contains(words);
-    if has("exception ") || has("another unit") || has("transaction") {
+    if has("does not hold") {
+        "the instrument answers: check its model, address and `unit`, then the [[signature]] of its profile"
+    } else if has("exception ") || has("another unit") || has("transaction") {
         "the link itself works: check the profile and the settings of the gateway"
     } else if has("rx_terminator") || has("was answered by") || has("bytes came") {
         "the instrument answers: check line end, speed, format and echo, then the profile"

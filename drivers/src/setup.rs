@@ -22,6 +22,8 @@ pub enum SetupError {
     NoAxis { known: String },
     #[error("the gain of axis `{0}` must not be zero, and both numbers must be finite")]
     Gain(&'static str),
+    #[error("one signal, `{0}`, cannot be both axes")]
+    OneSignal(String),
     #[error("the [[force]] instruments must give each of the axes `lateral` and `normal` once")]
     Axes,
     #[error("`{0}` must be above zero")]

@@ -37,10 +37,14 @@ pub struct Answers {
     pub bad_share: f64,
     /// Of an instrument that sends by itself: share of its samples that never came. A polled one has none.
     pub lost_share: f64,
+    /// Whether answers came and none was a new sample.
+    pub repeats_only: bool,
     /// Times that the link was made anew.
     pub reconnected: u64,
     /// The latest problem in words; empty where there was none.
     pub last_problem: String,
+    /// The fault that it reports, in its profile's words; empty for none.
+    pub fault: String,
 }
 
 /// One instrument as it was found.
@@ -260,7 +264,9 @@ fn answers(
         samples_per_s: samples as f64 / seconds,
         bad_share: share(wrong, wrong + samples + repeats),
         lost_share: share(lost, lost + samples),
+        repeats_only: samples == 0 && repeats > 0,
         reconnected: after.connections - before.connections,
         last_problem: after.last_problem.clone(),
+        fault: after.fault.clone(),
     }
 }

@@ -56,7 +56,9 @@ const PLUG: &str = "plug it in or correct the address; `--offline` leaves the po
 fn can_be_served(instrument: &InstrumentSetup) -> Result<(), Closed> {
     let remedy = "end the program that has it, or state port 0: any free one is taken";
     match kind(instrument) {
-        Some((LinkKind::ModbusTcp | LinkKind::Scpi, port)) if !instrument.address.starts_with("rtu:") => {
+        Some((LinkKind::ModbusTcp | LinkKind::Scpi | LinkKind::Tcp, port))
+            if !instrument.address.starts_with("rtu:") =>
+        {
             let address = resolve(&instrument.address, port);
             let address = address.map_err(|e| (e.to_string(), "correct the address"))?;
             TcpListener::bind(address).map(drop).map_err(|e| (format!("cannot be served there: {e}"), remedy))
@@ -77,16 +79,23 @@ fn kind(instrument: &InstrumentSetup) -> Option<(LinkKind, Option<u16>)> {
 fn opens(instrument: &InstrumentSetup) -> Result<(), Closed> {
     let Some((kind, port)) = kind(instrument) else { return Ok(()) };
     let address = instrument.address.as_str();
+    let found = |address: &str| {
+        let correct = "correct the address; `--offline` leaves the ports out";
+        resolve(address, port).map_err(|e| (e.to_string(), correct))
+    };
     let socket = |address: &str| {
-        let found = resolve(address, port)
-            .map_err(|e| (e.to_string(), "correct the address; `--offline` leaves the ports out"))?;
+        let found = found(address)?;
         let accepted = TcpStream::connect_timeout(&found, ACCEPTS_WITHIN);
         let remedy = "switch it on, check cable and address; `--offline` leaves the ports out";
         accepted.map(drop).map_err(|e| (format!("nobody accepts there: {e}"), remedy))
     };
     match kind {
         LinkKind::ModbusTcp if !address.starts_with("rtu:") => socket(address),
-        LinkKind::Scpi => socket(address.strip_prefix("tcp:").unwrap_or(address)),
+        LinkKind::Scpi | LinkKind::Tcp => socket(address.strip_prefix("tcp:").unwrap_or(address)),
+        // Nobody accepts datagrams before one is sent.
+        LinkKind::Udp => found(address).map(drop),
+        LinkKind::Sysfs if Path::new(address).is_dir() => Ok(()),
+        LinkKind::Sysfs => Err(("there is no such folder".into(), PLUG)),
         LinkKind::Serial if address.starts_with("tcp:") => socket(&address[4..]),
         LinkKind::Can | LinkKind::Canopen if !address.starts_with("slcan:") => {
             let there = Path::new("/sys/class/net").join(address).exists();
@@ -113,4 +122,29 @@ fn line(path: &Path) -> Result<(), Closed> {
     let is_line = file.metadata().is_ok_and(|m| m.file_type().is_char_device());
     let other = ("that is not a serial line".into(), "name the device, as in /dev/ttyUSB0");
     if is_line { Ok(()) } else { Err(other) }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use drivers::library::Source;
+
+    /// An instrument with a socket, datagrams or a folder is none with a serial line.
+    #[test]
+    fn each_kind_of_link_is_opened_as_its_driver_does() {
+        let listener = TcpListener::bind("127.0.0.1:0").unwrap();
+        let there = listener.local_addr().unwrap().to_string();
+        let text = include_str!("../../docs/profiles/ascii-generator.toml");
+        let text = text.replacen("kind = \"serial\"", "kind = \"tcp\"", 1);
+        let source = Source { id: "own".into(), origin: "own".into(), text, files: Vec::new() };
+        let tcp = InstrumentSetup { source: Some(source.into()), ..InstrumentSetup::new("own", &there) };
+        assert_eq!(opens(&tcp), Ok(()));
+        drop(listener);
+        assert!(opens(&tcp).unwrap_err().0.contains("nobody accepts"));
+        assert_eq!(opens(&InstrumentSetup::new("ati-netft-rdt", "127.0.0.1:49152")), Ok(()));
+        let folder = tempfile::tempdir().unwrap();
+        let sysfs = |folder: &Path| InstrumentSetup::new("iio-voltage", folder.to_str().unwrap());
+        assert_eq!(opens(&sysfs(folder.path())), Ok(()));
+        assert!(opens(&sysfs(Path::new("/no/such/device"))).is_err());
+    }
 }

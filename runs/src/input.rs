@@ -154,7 +154,11 @@ pub fn unit_meant(key: &str, value: f64, [low, high]: [f64; 2]) -> Option<String
         return Some(format!("{} meant? Then write {}", other.1, rounded(other.0, 6)));
     }
     // Nobody writes thousandths of a per cent, of a degree or of arbitrary units.
-    if matches!(unit, "" | "%" | "a.u." | "deg C") || value == 0.0 || within(value) {
+    if matches!(unit, "" | "%" | "a.u." | "deg C")
+        || value == 0.0
+        || within(value)
+        || value < 0.0 && low >= 0.0
+    {
         return None;
     }
     // Nobody means a millihertz or a kilometre: the prefixes that people use are those of the quantity.
@@ -465,6 +469,7 @@ mod tests {
         for key in ["relative_humidity_pct", "skin_moisture_au", "temperature_c"] {
             assert_eq!(of(key, 5000.0), None, "{key}");
         }
+        assert_eq!(unit_meant("normal_stiffness_n_per_m", -500.0, [1e2, 1e6]), None, "a sign is no prefix");
         // Half a metre of amplitude is half a micrometre; a speed twice too large is a speed.
         let amplitude = |value| unit_meant("amplitude_pp_m", value, [0.0, 6e-6]);
         assert!(amplitude(0.5).is_some_and(|words| words.contains("\u{b5}m meant? Then write 5e-7")));

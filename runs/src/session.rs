@@ -287,7 +287,7 @@ impl Job {
         let points = self.plan.points(self.seed, &self.setup.config.limits, &resolution)?;
         self.plan.check_ambient(&self.setup)?;
         self.plan.check_reach(&self.setup.reaches()?)?;
-        if let Some(mut channel) = self.setup.lateral_channel()? {
+        if let Some(mut channel) = self.setup.lateral_channel() {
             channel.noise_n = noise_n.or(channel.noise_n);
             let mu0 = self.setup.tip.mu0;
             self.plan.check_visible(&points, &resolution, &*self.model, mu0, &channel)?;

@@ -26,7 +26,7 @@ use serde::{Deserialize, Serialize};
 use std::path::{Path, PathBuf};
 
 pub use limits::LimitsFile;
-pub use profiles::{library, look_in};
+pub use profiles::{Axis, library, look_in};
 
 /// Name and text of every bundled setup. Add one: a file in `runs/setups/` and a line here.
 pub const BUNDLED: &[(&str, &str)] = &[
@@ -363,37 +363,27 @@ impl Setup {
 
     /// -3 dB bandwidth of the lateral channel's filter in Hz, where its profile states one.
     pub fn lateral_passband_hz(&self) -> Option<f64> {
-        let profile = |i: &drivers::InstrumentSetup| {
-            let named = i.lateral.as_ref().map_or("lateral", |axis| axis.signal.as_str());
-            i.description().ok().filter(|profile| profile.signal(named).is_some())
-        };
-        self.file.force.iter().find_map(profile)?.description.time.passband_hz
+        let mut axes = self.file.axes();
+        axes.find(|axis| axis.name == "lateral")?.profile.description.time.passband_hz
     }
 
     /// What reads the lateral force, by profile, setup and certificate; `None` where no instrument does.
-    pub fn lateral_channel(&self) -> miette::Result<Option<LateralChannel>> {
-        for instrument in &self.file.force {
-            let profile = instrument.description().map_err(|e| miette::miette!("{e}"))?;
-            let named = instrument.lateral.as_ref().map_or("lateral", |axis| axis.signal.as_str());
-            let Some(signal) = profile.signal(named) else { continue };
-            let gain = instrument.lateral.as_ref().map_or(1.0, |axis| axis.gain).abs();
-            let by_profile = gain * profile.lsb_si(signal, &profile.values());
-            let count = match &self.certificates.force {
-                None => by_profile,
-                Some((calibration, zero)) => {
-                    let at = |counts: f64| calibration.apply([counts, 0.0], zero)[0];
-                    (at(1.0) - at(0.0)).abs()
-                }
-            };
-            let described = &profile.description.signal[signal.0];
-            return Ok(Some(LateralChannel {
-                sensor: format!("`{}` ({named})", instrument.profile),
-                count_n: Some(count).filter(|count| count.is_finite()),
-                noise_n: described.noise.map(|noise| gain * noise * described.si.factor),
-                pass_sd_n: self.file.noise.force_sd_n,
-            }));
-        }
-        Ok(None)
+    pub fn lateral_channel(&self) -> Option<LateralChannel> {
+        let axis = self.file.axes().find(|axis| axis.name == "lateral")?;
+        let (gain, described) = (axis.gain.abs(), axis.described());
+        let count = match &self.certificates.force {
+            None => gain * axis.profile.lsb_si(axis.signal, &axis.profile.values()),
+            Some((calibration, zero)) => {
+                let at = |counts: f64| calibration.apply([counts, 0.0], zero)[0];
+                (at(1.0) - at(0.0)).abs()
+            }
+        };
+        Some(LateralChannel {
+            sensor: format!("`{}` ({})", axis.instrument.profile, described.name.as_ref()),
+            count_n: Some(count).filter(|count| count.is_finite()),
+            noise_n: described.noise.map(|noise| gain * noise * described.si.factor),
+            pass_sd_n: self.file.noise.force_sd_n,
+        })
     }
 
     /// What its instruments take and see, by their profiles and this setup.
@@ -427,21 +417,15 @@ impl Setup {
         if self.certificates.force.is_some() {
             return Ok(all);
         }
-        for instrument in &instruments.force {
-            let profile = described(instrument)?;
-            for (axis, name, per_load) in
-                [(&instrument.normal, "normal", 1.0), (&instrument.lateral, "lateral", self.tip.mu0)]
-            {
-                let (signal, gain) = axis.as_ref().map_or((name, 1.0), |a| (a.signal.as_str(), a.gain));
-                let Some(signal) = profile.signal(signal) else { continue };
-                let signal = &profile.description.signal[signal.0];
-                let Some((low, high)) = signal.range else { continue };
-                let ends = [low, high].map(|end| (end * signal.si.factor * gain).abs());
-                // Compression is positive, and sliding goes both ways.
-                let end = if name == "normal" && gain > 0.0 { ends[1] } else { ends[0].min(ends[1]) };
-                let by = format!("`{}` sees as {name} force", profile.id());
-                all.push(Reach { column: "normal_force_n", range: [0.0, end / per_load], by });
-            }
+        for axis in self.file.axes() {
+            let (name, signal) = (axis.name, axis.described());
+            let Some((low, high)) = signal.range else { continue };
+            let per_load = if name == "normal" { 1.0 } else { self.tip.mu0 };
+            let ends = [low, high].map(|end| (end * signal.si.factor * axis.gain).abs());
+            // Compression is positive, and sliding goes both ways.
+            let end = if name == "normal" && axis.gain > 0.0 { ends[1] } else { ends[0].min(ends[1]) };
+            let by = format!("`{}` sees as {name} force", axis.profile.id());
+            all.push(Reach { column: "normal_force_n", range: [0.0, end / per_load], by });
         }
         Ok(all)
     }

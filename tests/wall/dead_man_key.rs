@@ -267,7 +267,7 @@ fn a_key_that_is_held_from_the_beginning_arms_nothing() {
             }
             assert_eq!(run.summary()["outcome"], "would_not_arm");
             assert_eq!(status, Some(1), "{said}");
-            assert!(said.contains("did not arm: the dead-man device was released"), "{said}");
+            assert!(said.contains("would not arm: the dead-man device was released"), "{said}");
             assert!(said.contains("grip it again"), "{said}");
             None
         });

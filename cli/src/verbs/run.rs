@@ -403,10 +403,15 @@ fn tell(summary: &Summary, json: bool) {
             stall.lasted.seconds() * 1e3
         );
     }
-    if let (Outcome::WouldNotArm { blocking: Some(cause) }, Some(remedy)) =
-        (&summary.outcome, &summary.remedy)
-    {
-        report!("the rig did not arm: {}\n  {remedy}", cause.words());
+    // A trip was told when it came.
+    if !matches!(summary.outcome, Outcome::Complete | Outcome::Stopped | Outcome::Tripped(_)) {
+        report!("{}", summary.outcome.words());
+        summary.remedy.iter().for_each(|remedy| report!("  {remedy}"));
+    }
+    let tripped = matches!(summary.outcome, Outcome::Tripped(_));
+    for (name, link) in summary.links.iter().filter(|_| tripped) {
+        let fault = link["fault"].as_str().filter(|fault| !fault.is_empty());
+        fault.iter().for_each(|fault| report!("`{name}` reports: {fault}"));
     }
     if summary.passes < summary.planned {
         report!("to resume, repeat the command with --out {}", summary.folder.display());

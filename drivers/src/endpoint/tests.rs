@@ -227,3 +227,52 @@ fn what_a_sensor_shows_before_it_is_set_up_is_kept_from_the_loop() {
     endpoint.frame(frame, &bytes, Nanos(20)).unwrap();
     assert!(force.read(Nanos(21)).lateral.is_ok());
 }
+
+#[test]
+fn one_signal_is_not_both_axes() {
+    let normal = || Some(AxisSetup { signal: "normal".into(), gain: 1.0, offset_n: 0.0 });
+    let force = |lateral, normal| {
+        let setup = InstrumentSetup { lateral, normal, ..InstrumentSetup::new("muprime-force2", "") };
+        Endpoint::force(profile("muprime-force2").unwrap(), &setup).map(|_| ()).err()
+    };
+    let same = Some(SetupError::OneSignal("normal".into()));
+    assert_eq!((force(normal(), None), force(normal(), normal())), (same.clone(), same));
+    assert_eq!((force(None, None), force(None, normal())), (None, None));
+}
+
+/// The words that a profile has for a fault or a wrong instrument reach people, with what was read.
+#[test]
+fn a_fault_and_a_wrong_instrument_are_shown_with_what_was_read() {
+    let (mut endpoint, _port) = amplifier();
+    let frame = endpoint.profile().frame("state").unwrap();
+    let stops = endpoint.profile().description.fault.iter().position(|f| f.severity == Severity::Stop);
+    let fault = endpoint.profile().description.fault[stops.unwrap()].clone();
+    let mut sets = |endpoint: &mut Endpoint, counter: u16, faulty: bool| {
+        let mut bytes = state(counter, false);
+        let mut wanted = |signal: SignalId| {
+            let named = endpoint.profile().description.signal[signal.0].name.as_ref();
+            fault
+                .when
+                .as_ref()
+                .split(|c: char| !(c.is_alphanumeric() || c == '_'))
+                .any(|w| w == named)
+                .then_some(1.0)
+        };
+        if faulty {
+            endpoint.profile().encode(frame, &mut bytes, &mut wanted);
+        }
+        endpoint.frame(frame, &bytes, Nanos(u64::from(counter))).unwrap();
+        endpoint.health().report().fault
+    };
+    assert_eq!(sets(&mut endpoint, 1, false), "");
+    let said = sets(&mut endpoint, 2, true);
+    assert!(
+        said.starts_with(&fault.text) && said.contains(fault.when.as_ref()) && said.contains("= 1"),
+        "{said}"
+    );
+    assert_eq!(sets(&mut endpoint, 3, false), "", "it is gone");
+    let mut other = state(4, false);
+    other[0] = 0;
+    let Err(BadFrame::WrongInstrument(why)) = endpoint.frame(frame, &other, Nanos(9)) else { panic!() };
+    assert!(why.contains("magic = ") && why.contains("does not hold"), "{why}");
+}

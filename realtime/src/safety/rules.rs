@@ -128,7 +128,7 @@ rules! {
     "SR-33" LateralLossy [Share] "At least a quarter of the lateral samples that are due in a window come." => |c| lossy(c, c.watch.lateral.share_came);
     "SR-34" NormalLossy [Share] "At least a quarter of the normal samples that are due in a window come." => |c| lossy(c, c.watch.normal.share_came);
     "SR-37" SupplySwitch [Second] "A second switch-off channel that is fitted reads back its command." => supply_switch;
-    "SR-38" Unguarded [Flag] "A human finger needs a second channel, an emergency stop, a dead-man device, and a watchdog at the amplifier or at the second channel; an amplifier without watchdog needs a second channel." => unguarded;
+    "SR-38" Unguarded [Flag] "A human finger needs a second channel, an emergency stop, a dead-man device, and a watchdog of at most 1 s at the amplifier or at the second channel; an amplifier without such a watchdog needs a second channel." => unguarded;
     "SR-39" ExposureDuty [Second] "With a human finger, no larger share of the last hour is vibrated than its limit." => exposure_duty;
     "SR-40" ExposureDose [SquareMetrePerSecond] "With a human finger, the squared velocity summed over the last hour stays below its limit." => exposure_dose;
     "SR-41" AmplitudeSaturated [Count] "An amplitude at the end of its range in two states in a row switches off." => |c| broken(c.watch.amplitude_saturated_in_a_row >= 2, f64::from(c.watch.amplitude_saturated_in_a_row), 2.0);

@@ -162,6 +162,11 @@ fn instrument(found: &Found, look: &Look, target: &Target<'_>) -> Finding {
         _ => {}
     }
     linked(answers, &mut problems);
+    // Without its supply every amplifier that can shows a fault: it is not its own.
+    if !answers.fault.is_empty() && !(found.role == "amplifier" && look.supply_is_open()) {
+        let advice = "look it up in its manual, and reset it at the instrument";
+        problems.push((format!("it reports: {}", answers.fault), advice));
+    }
     let mut parts = vec![states.join(", "), format!("{:.0} samples a second", answers.samples_per_s)];
     parts.retain(|part| !part.is_empty());
     parts.extend(problems.iter().map(|(problem, _)| problem.clone()));
@@ -227,7 +232,11 @@ fn linked(answers: &Answers, problems: &mut Vec<Problem>) {
         problems.push((format!("its link broke {} times", answers.reconnected), LINK));
     }
     if !answers.last_problem.is_empty() {
-        problems.push((answers.last_problem.clone(), LINK));
+        problems.push((answers.last_problem.clone(), drivers::remedy::advice(&answers.last_problem)));
+    }
+    if answers.repeats_only {
+        let problem = "answers come, but the counter that its profile names as `sequence` does not change";
+        problems.push((problem.into(), "start its measurement; else correct `sequence` or leave it out"));
     }
 }
 
@@ -266,15 +275,11 @@ fn force(c: &ChannelReport, target: &Target<'_>, problems: &mut Vec<Problem>) {
 
 /// Noise of an axis by its profile, in N.
 fn stated_noise(setup: &Setup, axis: &str) -> Option<f64> {
-    setup.file.force.iter().find_map(|instrument| {
-        let own = if axis == "normal" { &instrument.normal } else { &instrument.lateral };
-        let profile = instrument.description().ok()?;
-        let (signal, gain) = own.as_ref().map_or((axis, 1.0), |a| (a.signal.as_str(), a.gain));
-        let signal = profile.signal(signal)?;
-        let described = &profile.description.signal[signal.0];
-        let count = profile.lsb_si(signal, &profile.values());
+    setup.file.axes().filter(|found| found.name == axis).find_map(|axis| {
+        let described = axis.described();
+        let count = axis.profile.lsb_si(axis.signal, &axis.profile.values());
         let noise = described.noise.map_or(count, |noise| noise * described.si.factor);
-        Some(noise.abs() * gain.abs()).filter(|noise| noise.is_finite())
+        Some(noise.abs() * axis.gain.abs()).filter(|noise| noise.is_finite())
     })
 }
 

@@ -64,11 +64,10 @@ fn verdict(w: &mut String, run: &RunData) {
             let [trip, remedy] = [&*trip.to_string(), trip.cause.remedy()].map(escape);
             format!("Ended early after {made} of {planned} passes: tripped, {trip}.<br>{remedy}")
         }
-        Some(Outcome::WouldNotArm { blocking: Some(cause) }) => {
-            format!("The rig would not arm: {}.<br>{}", escape(cause.words()), escape(cause.remedy()))
-        }
         Some(outcome) => {
-            format!("Ended early after {made} of {planned} passes: {}.", escape(&outcome.words()))
+            let remedy = outcome.remedy().map_or(String::new(), |remedy| format!("<br>{}", escape(remedy)));
+            let words = escape(&outcome.words());
+            format!("Ended early after {made} of {planned} passes: {words}.{remedy}")
         }
     };
     let finding = if let Some(first) = departed {

@@ -245,6 +245,16 @@ impl Outcome {
         }
     }
 
+    /// What to do about it, where that is known.
+    pub fn remedy(&self) -> Option<&'static str> {
+        match self {
+            Outcome::NoContact { .. } => Some(
+                "check that the finger is lowered, the load or `dead_weight_n`, and that lateral and normal are not swapped",
+            ),
+            _ => self.cause().map(Cause::remedy),
+        }
+    }
+
     /// How the sweep ended, in words.
     pub fn words(&self) -> String {
         match self {

@@ -197,7 +197,7 @@ impl Keeper {
         let rig = crate::input::rig_file(&self.dir.path().join("rig.toml")).ok();
         let mut summary = Summary {
             requirement: outcome.cause().and_then(Cause::requirement).map(String::from),
-            remedy: outcome.cause().map(|cause| cause.remedy().to_string()),
+            remedy: outcome.remedy().map(String::from),
             outcome,
             folder: self.dir.path().to_path_buf(),
             passes: self.passes,

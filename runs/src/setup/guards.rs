@@ -35,10 +35,13 @@ pub(super) fn not_wired(file: &SetupFile) -> Vec<String> {
     named.filter(|name| has(board, name) && !board.is_wired(name)).map(String::from).collect()
 }
 
-/// How long an instrument waits for a heartbeat, in ms: none where it has no watchdog, and none inside where its profile does not say.
-fn waits(instrument: &InstrumentSetup) -> Option<Option<u32>> {
+/// The longest wait of a watchdog, in ms: so long a dead program would vibrate a finger.
+const WATCHDOG_MAX_MS: u32 = 1000;
+
+/// How long an instrument waits for a heartbeat, in ms, where that is stated and short.
+fn waits(instrument: &InstrumentSetup) -> Option<u32> {
     let profile = instrument.description().ok()?;
-    profile.heartbeat().map(|heartbeat| heartbeat.timeout_ms)
+    profile.heartbeat()?.timeout_ms.filter(|ms| *ms <= WATCHDOG_MAX_MS)
 }
 
 /// Whether the amplifier, and whether its supply's switch, falls by itself when this program dies.
@@ -51,14 +54,13 @@ pub(super) fn if_this_program_dies(file: &SetupFile) -> String {
     if file.virtual_rig.is_some() {
         return String::new();
     }
-    let within = |ms: Option<u32>| ms.map_or_else(String::new, |ms| format!(" within {ms} ms"));
     let output = match (waits(&file.amplifier), file.supply_relay.as_ref().and_then(waits)) {
-        (Some(ms), _) => format!("the amplifier switches off by itself{}", within(ms)),
-        (None, Some(ms)) => format!("the supply relay opens by itself{}", within(ms)),
+        (Some(ms), _) => format!("the amplifier switches off by itself within {ms} ms"),
+        (None, Some(ms)) => format!("the supply relay opens by itself within {ms} ms"),
         (None, None) => "the output stays on".into(),
     };
     match waits(&file.stage) {
-        Some(ms) => format!("{output}; the stage stops by itself{}", within(ms)),
+        Some(ms) => format!("{output}; the stage stops by itself within {ms} ms"),
         None => format!("{output}; the stage continues at its last command"),
     }
 }
@@ -77,8 +79,8 @@ pub(super) fn guarded(file: &SetupFile, tip: Option<&Fingertip>, wrong: &mut Pro
         (has(&file.amplifier, "temperature"), "an amplifier whose temperature is read (temperature_fitted)"),
         (
             amplifier || supply || file.virtual_rig.is_some(),
-            "a watchdog at the amplifier or at its supply relay (a profile with `heartbeat`, such as wago-750-watchdog): without one \
-             the output stays on if this program dies",
+            "a watchdog at the amplifier or at its supply relay (a profile with a `heartbeat` whose `timeout_ms` is at most 1000, such \
+             as wago-750-watchdog): without one the output stays on if this program dies",
         ),
     ];
     let missing: Vec<&str> = needs.iter().filter(|(there, _)| !there).map(|(_, what)| *what).collect();
@@ -189,6 +191,34 @@ fn real_addresses(file: &SetupFile, wrong: &mut Problems<'_>) {
                 ),
                 "take [virtual] out for a real rig; a virtual one has 127.0.0.1:0, pty or vcan0".to_string(),
             );
+        }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::setup::Setup;
+    use drivers::library::Source;
+    use std::sync::Arc;
+
+    /// A heartbeat whose time is long or not stated leaves the output on when this program dies.
+    #[test]
+    fn a_watchdog_has_a_short_and_stated_time() {
+        let text = drivers::bundled::text("muprime-amplifier").unwrap();
+        let mut file = Setup::load("virtual-ideal").unwrap().file;
+        file.virtual_rig = None;
+        let mut with = |time: &str| {
+            let text = text.replacen("\ntimeout_ms = 50", &format!("\n{time}"), 1);
+            let (id, origin) = ("muprime-amplifier".into(), "own".into());
+            file.amplifier.source = Some(Arc::new(Source { id, origin, text, files: Vec::new() }));
+            (watchdogs(&file).0, if_this_program_dies(&file))
+        };
+        let (fed, words) = with("timeout_ms = 1000");
+        assert!(fed && words.contains("within 1000 ms"), "{words}");
+        for time in ["timeout_ms = 999999999", "timeout_ms = 1001", ""] {
+            let (fed, words) = with(time);
+            assert!(!fed && words.contains("the output stays on"), "{time}: {words}");
         }
     }
 }

@@ -8,6 +8,7 @@ use drivers::ports::compose;
 use drivers::{InstrumentSetup, bundled};
 use instruments::schema::LinkKind;
 use instruments::traffic::LineSetup;
+use instruments::{Profile, SignalId};
 use std::collections::BTreeMap;
 use std::path::{Path, PathBuf};
 use std::sync::{Arc, OnceLock};
@@ -67,7 +68,60 @@ pub(super) fn resolve(file: &mut SetupFile, folder: &Path) -> Vec<Problem> {
     problems
 }
 
+/// The signal that gives an axis of force.
+pub struct Axis<'a> {
+    /// `lateral` or `normal`.
+    pub name: &'static str,
+    /// The instrument that it is of.
+    pub instrument: &'a InstrumentSetup,
+    /// That instrument's profile.
+    pub profile: Profile,
+    /// Its signal.
+    pub signal: SignalId,
+    /// `gain` of the setup, 1 where it states none.
+    pub gain: f64,
+}
+
+impl Axis<'_> {
+    /// The signal as the profile describes it.
+    pub fn described(&self) -> &instruments::schema::Signal {
+        &self.profile.description.signal[self.signal.0]
+    }
+
+    /// The signal, its profile and the axis, in words.
+    fn shown(&self) -> String {
+        format!("`{}` of `{}` ({})", self.described().name.as_ref(), self.instrument.profile, self.name)
+    }
+}
+
 impl SetupFile {
+    /// The axes of force that its instruments give, by the setup or by the names of their signals.
+    pub fn axes(&self) -> impl Iterator<Item = Axis<'_>> {
+        self.force.iter().flat_map(|instrument| {
+            let both = [("lateral", &instrument.lateral), ("normal", &instrument.normal)];
+            both.into_iter().filter_map(move |(name, stated)| {
+                let profile = instrument.description().ok()?;
+                let (signal, gain) = stated.as_ref().map_or((name, 1.0), |a| (a.signal.as_str(), a.gain));
+                Some(Axis { name, instrument, signal: profile.signal(signal)?, profile, gain })
+            })
+        })
+    }
+
+    /// Whether the signals of force have counts, which a certificate of force turns into newtons.
+    ///
+    /// # Errors
+    /// The signal that has none, and what to do without a certificate.
+    pub fn has_counts(&self) -> Result<(), String> {
+        let float = self.axes().find(|axis| !axis.profile.has_counts(axis.signal));
+        float.map_or(Ok(()), |axis| {
+            Err(format!(
+                "signal {} is a float and has no counts, which a force certificate needs: name a signal of whole \
+                 numbers, or correct the axis by its `gain` and `offset_n`",
+                axis.shown()
+            ))
+        })
+    }
+
     /// Its instruments, each with the table in which it stands; the chamber, which takes no part in the loop,
     /// is none of them.
     pub fn by_table(&self) -> Vec<(&'static str, &InstrumentSetup)> {
@@ -214,6 +268,29 @@ fn line_of(instrument: &InstrumentSetup) -> LineSetup {
     }
 }
 
+/// The first key that the driver of the instrument would ignore.
+fn meaningless(table: &str, i: &InstrumentSetup, profile: &Profile) -> Option<&'static str> {
+    use LinkKind::{Can, Canopen, ModbusRtu, ModbusTcp, Serial};
+    let (kind, rtu) = (profile.description.link.kind, i.address.starts_with("rtu:"));
+    let line = rtu || (matches!(kind, ModbusRtu | Serial) && !i.address.starts_with("tcp:"));
+    let keys = [
+        ("unit", i.unit.is_some(), matches!(kind, ModbusRtu | ModbusTcp)),
+        ("base", i.base.is_some(), matches!(kind, Can | Canopen)),
+        ("baud", i.baud.is_some(), line),
+        ("amplitude_m_per_unit", i.amplitude_m_per_unit.is_some(), table == "amplifier"),
+        (
+            "measured_m_per_unit",
+            i.measured_m_per_unit.is_some(),
+            table == "amplifier" && profile.signal("amplitude").is_some(),
+        ),
+        ("wired", i.wired.is_some(), table == "safety_inputs"),
+        ("dead_weight_n", i.dead_weight_n.is_some(), table == "stage"),
+        ("lateral", i.lateral.is_some(), table == "force"),
+        ("normal", i.normal.is_some(), table == "force"),
+    ];
+    keys.into_iter().find(|(_, stated, read)| *stated && !read).map(|(key, ..)| key)
+}
+
 /// Roles, signals and set-points, then the line's capacity; with the key that is to blame.
 fn one_fits(table: &str, instrument: &InstrumentSetup) -> Result<(), (&'static str, String)> {
     let profile = instrument.description().map_err(|error| ("profile", error.to_string()))?;
@@ -222,6 +299,9 @@ fn one_fits(table: &str, instrument: &InstrumentSetup) -> Result<(), (&'static s
         return Err(("address", "`tcp:` is for serial lines behind a device server; leave it out".into()));
     }
     let share = profile.line_share(line);
+    if let Some(key) = meaningless(table, instrument, &profile) {
+        return Err((key, format!("`{key}` means nothing for this instrument: leave it out")));
+    }
     match table {
         "force" => Endpoint::force(profile, instrument).map(drop),
         "amplifier" => Endpoint::amplifier(profile, instrument).map(drop),
@@ -249,7 +329,17 @@ impl Setup {
             ports.push(Endpoint::force(instrument.description()?, instrument)?.1);
         }
         compose(ports)?;
-        Ok(())
+        let bare = |axis: &Axis<'_>| axis.described().si.unit != "N" && axis.gain.abs() == 1.0;
+        match self.file.axes().find(bare).filter(|_| self.certificates.force.is_none()) {
+            None => Ok(()),
+            Some(axis) => {
+                let (shown, unit) = (axis.shown(), &axis.described().si.unit);
+                Err(format!(
+                    "signal {shown} is in {unit:?}, not in N, and has neither `gain` nor certificate"
+                )
+                .into())
+            }
+        }
     }
 
     /// The profiles of its instruments, and the files that they name, by file name: for the record.
@@ -370,5 +460,50 @@ mod tests {
         assert!(parsed.profiles().contains(&("own-cell.toml".into(), own)));
         assert_eq!(parsed.instruments().force[0].description().unwrap().id(), "own-cell");
         assert_ne!(parsed.sha256(), later.sha256(), "another profile is another setup");
+    }
+
+    /// The ideal virtual rig with these lines after the profile of its sensor, amplifier or stage.
+    fn with(instrument: &str, more: &str) -> Result<Setup, String> {
+        let profile = format!("profile = \"muprime-{instrument}\"");
+        changed(&profile, &format!("{profile}\n{more}"))
+    }
+
+    #[test]
+    fn a_key_that_its_instrument_does_not_read_is_refused() {
+        for (instrument, more, key) in [
+            ("force2", "dead_weight_n = 0.2", "dead_weight_n"),
+            ("force2", "wired = [\"dead_man\"]", "wired"),
+            ("force2", "amplitude_m_per_unit = 1e-6", "amplitude_m_per_unit"),
+            ("force2", "baud = 9600", "baud"),
+            ("amplifier", "base = 5", "base"),
+            ("amplifier", "lateral = { signal = \"fault\" }", "lateral"),
+            ("stage", "measured_m_per_unit = 1e-6", "measured_m_per_unit"),
+        ] {
+            let why = with(instrument, more).map(|_| ()).unwrap_err();
+            assert!(why.contains(&format!("`{key}` means")), "{more}: {why}");
+        }
+        with("force2", "unit = 1").unwrap();
+    }
+
+    #[test]
+    fn an_axis_is_a_force_of_its_own() {
+        let why = with("force2", "lateral = { signal = \"normal\" }").map(|_| ()).unwrap_err();
+        assert!(why.contains("both axes"), "{why}");
+        let status = with("force2", "lateral = { signal = \"fault\" }").unwrap();
+        let why = status.has_both_axes().unwrap_err().to_string();
+        assert!(why.contains("`fault`") && why.contains("not in N"), "{why}");
+        with("force2", "lateral = { signal = \"lateral\", gain = -1.0 }").unwrap().has_both_axes().unwrap();
+    }
+
+    /// The bits of a float grow with it: a certificate of force over them is wrong, and looks good.
+    #[test]
+    fn a_float_has_no_counts_for_a_certificate() {
+        let folder = Path::new(env!("CARGO_MANIFEST_DIR")).join("../docs/profiles");
+        let text = Setup::load("virtual-ideal").unwrap().text;
+        let floats = text.replacen("muprime-force2", "strain-amp.toml", 1);
+        let floats = Setup::parse("floats", &floats, &folder).unwrap();
+        let why = floats.file.has_counts().unwrap_err();
+        assert!(why.contains("`lateral` of `strain-amp`") && why.contains("`gain`"), "{why}");
+        Setup::load("virtual-ideal").unwrap().file.has_counts().unwrap();
     }
 }

@@ -52,7 +52,7 @@ pub(super) fn complete(setup: &Setup) -> miette::Result<()> {
     }
     if !limits.amplifier_watchdog && setup.file.supply_relay.is_none() {
         let remedy = "give the rig a second switch-off channel, [supply_relay]";
-        lacks("watchdog: the rig would never be armed (SR-38)", remedy);
+        lacks("watchdog of at most 1 s (`timeout_ms`): the rig would never be armed (SR-38)", remedy);
     }
     wrong.end()
 }
