@@ -169,18 +169,19 @@ impl Import<'_> {
         let mut of = (values.len() + dropped.iter().filter(is_row).count(), "rows");
         let (mut series, mut spreads) = (None, Vec::new());
         if let Some(cut) = wanted.series {
+            dropped.extend(series::unusable(&mut values));
             if 2 * values.len() < of.0 {
                 return Err(self.mostly_dropped(&dropped, values.len(), of, padded));
             }
-            dropped.extend(series::unusable(&mut values));
-            let counts;
-            (values, spreads, counts) =
-                series::cut(&values, &cut).map_err(|e| miette::miette!("{source}: {e}"))?;
+            let (cut, counts) = series::cut(&values, &cut).map_err(|e| miette::miette!("{source}: {e}"))?;
+            (values, spreads) = cut.into_iter().unzip();
             (of, series) = ((values.len(), "steady stretches"), Some(counts));
         }
         let (passes, taken) = passes(&values, &spreads, &mut dropped);
         dropped.sort_by_key(|d| d.row);
-        if 2 * passes.len() < of.0 || passes.is_empty() {
+        // A word that is not understood may be that of every pass in one direction.
+        let no_way = dropped.iter().filter(|d| d.reason == values::NO_WAY).count();
+        if 2 * passes.len() < of.0 || passes.is_empty() || 10 * no_way > of.0 {
             return Err(self.mostly_dropped(&dropped, passes.len(), of, padded));
         }
         if series.is_none() {

@@ -116,7 +116,7 @@ clocked("two-fields-said.csv", lambda s: f"{(50 + s) // 60:02}:{(50 + s) % 60:02
 clocked("appended.csv", lambda s: s % 14, "refused", "Time (s)")
 clocked("appended-odd.csv", lambda s: s if s < 14 else round(s - 14 + 0.1, 1), "refused", "Time (s)")
 clocked("newest-first.csv", lambda s: s, "right", "Time (s)", ROWS[::-1])
-clocked("sorted.csv", lambda s: s, "right", "Time (s)", ROWS[::2] + ROWS[1::2])
+clocked("sorted.csv", lambda s: s, "refused", "Time (s)", ROWS[::2] + ROWS[1::2])
 text("steps-run.csv", lines([["Step", *NAMES], *[[1 if t < 14 else 2, t % 14, *r] for t, *r in ROWS]]), "either", SET, "--map",
      "Step=run,Time (s)=time:s,Speed (mm/s)=speed:mm/s,Load (N)=normal_force:N,Friction (N)=friction_force:N")
 # Cells.

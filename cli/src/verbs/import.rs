@@ -13,7 +13,7 @@ use tables::import::{Cut, Grid, Imported, Marks, Wanted, guessed_lines, import, 
 
 #[derive(Debug, clap::Args)]
 pub struct Args {
-    /// The table: delimited text, Excel or OpenDocument, Parquet, NumPy
+    /// The table: delimited text, Excel, OpenDocument, Parquet, Arrow, NumPy, MAT, HDF5
     file: PathBuf,
     /// What is what: HEADER=TARGET:UNIT, separated by commas; may be repeated; docs/reference.md lists
     /// targets and units [default: guessed from the headers and shown]

@@ -6,13 +6,6 @@ use super::values::Values;
 
 const DAY_S: f64 = 86_400.0;
 
-/// What a time of two fields is.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-enum Fields {
-    Hours,
-    Minutes,
-}
-
 /// A time as it is written.
 #[derive(Clone, Copy, Debug, PartialEq)]
 struct Reading {
@@ -26,18 +19,26 @@ struct Reading {
 
 /// Whether a cell is a time.
 pub fn is_time(cell: &Cell) -> bool {
-    reading(cell).is_some()
+    [true, false].into_iter().any(|month_first| written(cell, Some(month_first)).is_some())
 }
 
-/// A workbook's time, `12:34:56.7`, `1:02 PM`, with a date before it where there is one (`2024-03-01`,
-/// `01.03.2024`; one with slashes may begin with the month or the day, and is refused).
-fn reading(cell: &Cell) -> Option<Reading> {
+/// A workbook's time, `12:34:56.7`, `1:02 PM`, with a date before it where there is one; see [`days`].
+fn written(cell: &Cell, month_first: Option<bool>) -> Option<Reading> {
     let text = match cell {
         Cell::Clock(seconds) => {
             return Some(Reading { seconds: *seconds, dated: *seconds >= DAY_S, two: None });
         }
         Cell::Text(text) if text.contains(':') => text.trim_end_matches('Z'),
         _ => return None,
+    };
+    // An offset from universal time: +01:00.
+    let (text, offset_s) = match text.len().checked_sub(6).and_then(|at| text.split_at_checked(at)) {
+        Some((time, offset)) if time.contains('T') && offset.starts_with(['+', '-']) => {
+            let (hours, minutes) = offset[1..].split_once(':')?;
+            let seconds = 3600.0 * hours.parse::<f64>().ok()? + 60.0 * minutes.parse::<f64>().ok()?;
+            (time, if offset.starts_with('-') { -seconds } else { seconds })
+        }
+        _ => (text, 0.0),
     };
     let upper = text.to_ascii_uppercase();
     let half = ["AM", "PM"].iter().position(|half| upper.ends_with(half));
@@ -46,7 +47,10 @@ fn reading(cell: &Cell) -> Option<Reading> {
         Some((date, time)) => (Some(date), time),
         None => (None, text),
     };
-    let fields: Vec<&str> = time.split(':').collect();
+    // LabVIEW parts milliseconds with a colon too.
+    let joined = time.rsplit_once(':').filter(|(rest, ms)| rest.matches(':').count() == 2 && ms.len() == 3);
+    let joined = joined.map(|(rest, ms)| format!("{rest}.{ms}"));
+    let fields: Vec<&str> = joined.as_deref().unwrap_or(time).split(':').collect();
     let number =
         |k: usize| fields.get(k).map_or(Some(0.0), |p| p.trim().replace(',', ".").parse::<f64>().ok());
     if !(2..=3).contains(&fields.len()) {
@@ -61,26 +65,67 @@ fn reading(cell: &Cell) -> Option<Reading> {
     }
     let days = match date {
         None => 0.0,
-        Some(date) => {
-            let dotted = date.contains('.');
-            let parts: Vec<&str> = date.split(if dotted { '.' } else { '-' }).collect();
-            let number = |k: usize| parts.get(k)?.parse::<i64>().ok();
-            // A year of two digits might be a day.
-            let m = number(1).filter(|_| parts.len() == 3 && parts[if dotted { 2 } else { 0 }].len() == 4)?;
-            let (y, d) = if dotted { (number(2)?, number(0)?) } else { (number(0)?, number(2)?) };
-            if !(0..=9999).contains(&y) || !(1..=12).contains(&m) || !(1..=31).contains(&d) {
-                return None;
-            }
-            // Days of the civil calendar (proleptic Gregorian), the year beginning in March.
-            let (y, m) = if m > 2 { (y, m - 3) } else { (y - 1, m + 9) };
-            (365 * y + y.div_euclid(4) - y.div_euclid(100) + y.div_euclid(400) + (153 * m + 2) / 5 + d) as f64
-        }
+        Some(date) => days(date, month_first)?,
     };
     // Minutes have no decimals; hours of a clock end at 24.
     let stopwatch = fields[1].contains(['.', ',']) || hours >= 24.0;
     let two = (fields.len() == 2 && half.is_none() && date.is_none()).then_some(stopwatch);
-    let seconds = days * DAY_S + hours * 3600.0 + minutes * 60.0 + seconds;
+    let seconds = days * DAY_S + hours * 3600.0 + minutes * 60.0 + seconds - offset_s;
     Some(Reading { seconds, dated: date.is_some(), two })
+}
+
+/// Days from some day of a date: `2024-03-01`, `01.03.2024`, `01-Mar-2024`; of one with slashes if it is
+/// known whether it begins with the month.
+fn days(date: &str, month_first: Option<bool>) -> Option<f64> {
+    const MONTHS: [&str; 12] =
+        ["jan", "feb", "mar", "apr", "may", "jun", "jul", "aug", "sep", "oct", "nov", "dec"];
+    let mark = date.chars().find(|c| ".-/".contains(*c))?;
+    let parts: Vec<&str> = date.split(mark).collect();
+    let &[first, second, third] = &parts[..] else { return None };
+    let named = MONTHS.iter().position(|m| second.eq_ignore_ascii_case(m)).map(|k| k as i64 + 1);
+    // A year of two digits might be a day.
+    let (y, m, d) = match (mark, first.len(), third.len()) {
+        ('-' | '/', 4, _) => (first, second, third),
+        ('.', _, 4) => (third, second, first),
+        ('-', _, 4) if named.is_some() => (third, second, first),
+        ('/', _, 4) if month_first? => (third, first, second),
+        ('/', _, 4) => (third, second, first),
+        _ => return None,
+    };
+    let (y, m, d) = (y.parse::<i64>().ok()?, named.or_else(|| m.parse().ok())?, d.parse::<i64>().ok()?);
+    if !(0..=9999).contains(&y) || !(1..=12).contains(&m) || !(1..=31).contains(&d) {
+        return None;
+    }
+    // Days of the civil calendar (proleptic Gregorian), the year beginning in March.
+    let (y, m) = if m > 2 { (y, m - 3) } else { (y - 1, m + 9) };
+    let days = 365 * y + y.div_euclid(4) - y.div_euclid(100) + y.div_euclid(400) + (153 * m + 2) / 5 + d;
+    // From 1970 on, so that the seconds keep their decimals.
+    Some((days - 719_469) as f64)
+}
+
+/// The dates beside times of a day, row by row, and the column that has them.
+///
+/// # Errors
+/// In words: a column that is called a date and holds several that are not understood.
+fn dates(grid: &Grid, month_first: Option<bool>) -> Result<Option<(usize, Vec<f64>)>, String> {
+    let is_date = |word: &str| word.eq_ignore_ascii_case("date") || word.eq_ignore_ascii_case("datum");
+    let named = |header: &String| header.split(|c: char| !c.is_alphabetic()).any(is_date);
+    let Some(column) = grid.header.iter().position(named) else { return Ok(None) };
+    let day = |row| match grid.cell(row, column)? {
+        Cell::Clock(seconds) => Some(seconds / DAY_S).filter(|day| day.fract() == 0.0),
+        Cell::Text(text) => days(text.trim_end_matches(" 00:00:00"), month_first),
+        _ => None,
+    };
+    let name = &grid.header[column];
+    match grid.rows.iter().map(day).collect() {
+        Some(days) => Ok(Some((column, days))),
+        None if grid.rows.windows(2).all(|w| grid.cell(&w[0], column) == grid.cell(&w[1], column)) => {
+            Ok(None)
+        }
+        None => Err(format!(
+            "the column '{name}' holds dates that are not understood: write them as 2024-03-01, or map the time as time:mdy or time:dmy"
+        )),
+    }
 }
 
 /// The times of a column in s from the earliest, row by row, and what is to be noted of them; no times at all
@@ -90,9 +135,19 @@ fn reading(cell: &Cell) -> Option<Reading> {
 /// In words: times of two fields that may be either, clocks beside numbers, a clock without a date that jumps.
 pub fn times(grid: &Grid, column: usize, stated: &str) -> Result<(Vec<Option<f64>>, Vec<String>), String> {
     let cells: Vec<Option<&Cell>> = grid.rows.iter().map(|r| grid.cell(r, column)).collect();
-    let read: Vec<Option<Reading>> = cells.iter().map(|c| c.and_then(reading)).collect();
-    let Some(known) = read.iter().position(Option::is_some) else { return Ok((Vec::new(), Vec::new())) };
+    let month_first = ["mdy", "dmy"].iter().position(|order| *order == stated).map(|k| k == 0);
+    let known = cells.iter().position(|c| c.is_some_and(is_time));
+    let Some(known) = known else { return Ok((Vec::new(), Vec::new())) };
     let place = |k: usize| grid.rows[k].place;
+    let mut read: Vec<Option<Reading>> = cells.iter().map(|c| written((*c)?, month_first)).collect();
+    let either = |k: usize, what: &str, as_what: &str| {
+        let shown = cells[k].map(Cell::shown).unwrap_or_default();
+        Err(format!("row {}: '{shown}' may {what}; say which: map the column as {as_what}", place(k)))
+    };
+    let unclear = |k: &usize| month_first.is_none() && read[*k].is_none() && cells[*k].is_some_and(is_time);
+    if let Some(k) = (0..cells.len()).find(unclear) {
+        return either(k, "begin with the month or the day", "time:mdy or time:dmy");
+    }
     let number = |c: &Option<&Cell>| c.is_some_and(|c| c.is_number(grid.comma) && !is_time(c));
     if let Some(k) = cells.iter().position(number) {
         return Err(format!(
@@ -102,22 +157,23 @@ pub fn times(grid: &Grid, column: usize, stated: &str) -> Result<(Vec<Option<f64
         ));
     }
     let two: Vec<bool> = read.iter().flatten().filter_map(|r| r.two).collect();
-    let fields = match stated {
-        "mm:ss" => Fields::Minutes,
-        "hh:mm" => Fields::Hours,
-        _ if two.contains(&true) => Fields::Minutes,
-        _ if two.is_empty() => Fields::Hours,
-        _ => {
-            return Err(format!(
-                "row {}: '{}' may be hours and minutes or minutes and seconds; say which: map the column as time:hh:mm or time:mm:ss",
-                place(known),
-                cells[known].map(Cell::shown).unwrap_or_default()
-            ));
-        }
+    let minutes = match stated {
+        "mm:ss" => true,
+        "hh:mm" => false,
+        _ if two.is_empty() || two.contains(&true) => !two.is_empty(),
+        _ => return either(known, "be hours and minutes or minutes and seconds", "time:hh:mm or time:mm:ss"),
     };
-    let minutes = fields == Fields::Minutes;
     let seconds = |r: &Reading| if r.two.is_some() && minutes { r.seconds / 60.0 } else { r.seconds };
     let mut notes = vec!["times of day are counted from the earliest".to_string()];
+    if !minutes
+        && read.iter().flatten().all(|r| !r.dated)
+        && let Some((column, days)) = dates(grid, month_first)?
+    {
+        for (reading, day) in read.iter_mut().zip(days) {
+            *reading = reading.map(|r| Reading { seconds: r.seconds + day * DAY_S, dated: true, ..r });
+        }
+        notes.push(format!("the dates of '{}' were added", grid.header[column]));
+    }
     let mut all: Vec<Option<f64>> = read.iter().map(|r| r.as_ref().map(seconds)).collect();
     let rows: Vec<usize> = (0..all.len()).filter(|k| all[*k].is_some()).collect();
     let of_day = !minutes && read.iter().flatten().all(|r| !r.dated);
@@ -145,8 +201,8 @@ pub fn times(grid: &Grid, column: usize, stated: &str) -> Result<(Vec<Option<f64
     Ok((all.into_iter().map(|s| s.map(counted)).collect(), notes))
 }
 
-/// What the order of the rows says against their times: `Err` where a clock began again, `Ok` with a note
-/// where the rows are sorted otherwise.
+/// What the order of the rows says against their times: `Err` where a clock may have begun again, `Ok` with a
+/// note where it is accepted that the rows are sorted otherwise.
 pub fn order(values: &[&Values], accepted: bool) -> Result<Option<String>, String> {
     let mut runs: Vec<(Option<&str>, Vec<(u64, f64)>)> = Vec::new();
     for v in values {
@@ -164,18 +220,9 @@ pub fn order(values: &[&Values], accepted: bool) -> Result<Option<String>, Strin
         if back.is_empty() || rows.windows(2).all(|w| w[1].1 < w[0].1) {
             continue;
         }
-        let mut sorted: Vec<f64> = rows.iter().map(|r| r.1).collect();
-        sorted.sort_by(f64::total_cmp);
-        let mut gaps: Vec<f64> = sorted.windows(2).map(|w| w[1] - w[0]).collect();
-        gaps.sort_by(f64::total_cmp);
-        let span = sorted[sorted.len() - 1] - sorted[0];
-        // A rig makes one pass after the other. Passes of one clock keep a distance; those of clocks that begin again coincide.
-        let close = gaps[gaps.len() / 10] < 0.2 * span / gaps.len() as f64;
-        let few = 4 * back.len() <= rows.len();
-        let twice = gaps[0] <= 0.0;
         let first: Vec<String> = back.iter().take(5).map(|k| rows[*k].0.to_string()).collect();
         let more = if back.len() > 5 { ", ..." } else { "" };
-        if (twice || few && close) && !accepted {
+        if !accepted {
             return Err(format!("the time goes back in row {}{more}", first.join(", ")));
         }
         note = Some(format!(
@@ -192,7 +239,7 @@ mod tests {
 
     #[test]
     fn clocks_are_read() {
-        let at = |text: &str| reading(&Cell::Text(text.into())).map(|r| r.seconds);
+        let at = |text: &str| written(&Cell::Text(text.into()), None).map(|r| r.seconds);
         assert_eq!(at("01:02:03.5"), Some(3723.5));
         assert_eq!(at("00:01"), Some(60.0));
         let day = |a: &str, b: &str| at(b).unwrap() - at(a).unwrap();
@@ -211,7 +258,51 @@ mod tests {
         ] {
             assert_eq!(at(ambiguous), None, "{ambiguous}");
         }
+        assert_eq!(day("2024-03-01T11:59:50+01:00", "2024-03-01T10:59:51Z"), 1.0);
+        assert_eq!(day("01-Mar-2024 23:59:59", "2024-03-02 00:00:01"), 2.0);
+        assert!((day("2024-03-01 11:59:50.708", "2024-03-01 11:59:52.127") - 1.419).abs() < 5e-7);
+        assert_eq!(at("11:59:50:708"), Some(43_190.708));
         assert_eq!(at("1.5"), None);
         assert_eq!(at("a:b"), None);
+    }
+
+    fn import(header: &str, row: &str, map: &str) -> Result<Vec<f64>, String> {
+        use crate::import::guess::tests::{imported, table};
+        let text = table(&format!("{header};v (mm/s);Fz (N);Fx (N)"), &format!("{row};{{v}};0.25;{{fx}}"));
+        let (day, next) = text.split_at(text.match_indices('\n').nth(12).unwrap().0);
+        let text = format!("{day}{}", next.replace("01.03.", "02.03.").replace("03/01", "03/02"));
+        let made = imported(&text, map, "amplitude_pp=0", false)?;
+        Ok(made.table.lines().skip(1).map(|line| line.split(',').nth(1).unwrap().parse().unwrap()).collect())
+    }
+
+    #[test]
+    fn a_date_beside_a_time_of_day_counts() {
+        let times = import("Datum;Zeit", "01.03.2024;12:00:{t}", "").unwrap();
+        assert_eq!((times[1], times[12]), (2.0, 86_424.0));
+        let refusal = import("Date;Time", "03/01/2024;12:00:{t}", "").unwrap_err();
+        assert!(refusal.contains("'Date' holds dates that are not understood"), "{refusal}");
+        // One date that stays the same says nothing.
+        assert!(import("Date;Time", "5/1/2024;12:00:{t}", "").is_ok());
+    }
+
+    #[test]
+    fn a_date_with_slashes_needs_its_order() {
+        let refusal = import("Time", "03/01/2024 12:00:{t}", "").unwrap_err();
+        assert!(refusal.contains("time:mdy or time:dmy"), "{refusal}");
+        let times = import("Time", "03/01/2024 12:00:{t} PM", "Time=time:mdy").unwrap();
+        assert_eq!((times[1], times[12]), (2.0, 86_424.0));
+        let times = import("Time", "03/01/2024 12:00:{t}", "Time=time:dmy").unwrap();
+        assert_eq!(times[12], 24.0 + 31.0 * DAY_S, "the month is the second");
+    }
+
+    #[test]
+    fn a_clock_that_begins_again_is_refused() {
+        use crate::import::guess::tests::{imported, table};
+        let text = table("Time (s);v (mm/s);Fz (N);Fx (N)", "{t};{v};0.25;{fx}");
+        let again =
+            text.lines().skip(1).map(|line| format!("0.5{}\n", line.trim_start_matches(|c| c != ';')));
+        let refusal =
+            imported(&format!("{text}{}", again.take(1).collect::<String>()), "", "amplitude_pp=0", false);
+        assert!(refusal.clone().is_err_and(|e| e.contains("the time goes back in row 26")), "{refusal:?}");
     }
 }

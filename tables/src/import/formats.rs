@@ -110,11 +110,31 @@ fn read_known(
         mat::read(bytes, sheet, wanted)
     } else if bytes.starts_with(b"\x89HDF\r\n") || bytes.starts_with(b"MATLAB 7.3 MAT-file") {
         hdf5::read(bytes, sheet, wanted)
-    } else if workbook || bytes.starts_with(b"\xd0\xcf\x11\xe0") {
+    } else if workbook && bytes.starts_with(b"PK") || bytes.starts_with(b"\xd0\xcf\x11\xe0") {
         workbook::read(bytes, sheet)
+    } else if bytes.trim_ascii_start().starts_with(b"<") {
+        miette::bail!(
+            help = "open it in a spreadsheet program and save it as .xlsx or CSV",
+            "{shown} is HTML or XML"
+        )
     } else if bytes.starts_with(b"PK\x03\x04") || bytes.starts_with(b"\x1f\x8b") {
         miette::bail!(help = "unpack it first; of .npz, save one array as .npy", "{shown} is packed")
     } else {
         text::read(bytes, marks)
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// Many instruments call their text or HTML `.xls`.
+    #[test]
+    fn a_workbook_is_known_by_its_content() {
+        let read = |text: &str| read(Path::new("a.xls"), text.as_bytes(), None, Marks::default(), &[]);
+        assert_eq!(read("a\tb\n1.5\t2\n3\t4\n").unwrap().header, ["a", "b"]);
+        let refused = read("\n<html><table><tr><td>1</td></tr></table></html>").unwrap_err();
+        let help = format!("{refused:?}");
+        assert!(help.contains("save it as .xlsx or CSV"), "{help}");
     }
 }

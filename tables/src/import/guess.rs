@@ -31,7 +31,7 @@ pub fn guess(grid: &Grid, stated: &Map) -> Vec<Taken> {
 }
 
 /// A column as its header and its numbers suggest to take it.
-fn taken(grid: &Grid, index: usize) -> Option<Taken> {
+pub fn taken(grid: &Grid, index: usize) -> Option<Taken> {
     let header = &grid.header[index];
     let (target, unit) = found(header, unit_row(&grid.units, index))?;
     let cells = || grid.rows.iter().filter_map(|r| grid.cell(r, index));
@@ -62,18 +62,27 @@ fn taken(grid: &Grid, index: usize) -> Option<Taken> {
 /// Words of a name that is a mean.
 const MEANS: [&str; 6] = ["mean", "avg", "average", "mittel", "mittlere", "mittelwert"];
 /// Words of a name that is a deviation or an extreme, not the quantity.
-const STATISTICS: &str = "std sd stdev stddev stdabw dev deviation abw standardabweichung max min maximum minimum \
-                          median sem";
-/// Words of a row that is a sum, and names of statistics in two words.
-const SUMS: [&str; 6] = ["sum", "summe", "total", "meanvalue", "standarddeviation", "standarddev"];
+const STATISTICS: &str = "std sd stdev stddev stdabw dev deviation abw standardabweichung max min maximum minimum median sem variance \
+                          varianz streuung range spannweite cv rsd ci error écart ecart stabw desviación deviazione";
+/// Words of a row that is a mean or a sum.
+const SUMS: &str = "sum summe total gesamt overall rms mw ø σ x\u{304} mittelwerte durchschnitt moyenne media promedio meanvalue \
+                    standarddeviation standarddev";
+/// Words beside those; alone they name a row that sums others up only below another one.
+const BESIDE: &str = "n of all s p arith value standard type";
 
-/// Whether a word, plain, names a row that sums others up.
-pub fn sums_up(word: &str) -> bool {
-    MEANS.contains(&word) || SUMS.contains(&word) || is_statistic(word)
+fn is_in(list: &str, plain: &str) -> bool {
+    list.split(' ').any(|word| word == plain)
 }
 
-fn is_statistic(plain: &str) -> bool {
-    STATISTICS.split(' ').any(|word| word == plain)
+/// Whether a text names a row that sums others up; `below` that it is below such a row.
+pub fn sums_up(text: &str, below: bool) -> bool {
+    let small = text.to_lowercase();
+    let words = small.split(|c: char| !c.is_alphanumeric() && c != '\u{304}');
+    let words: Vec<&str> =
+        words.filter(|w| !w.is_empty() && !w.bytes().all(|b| b.is_ascii_digit())).collect();
+    let sums = |word: &&str| MEANS.contains(word) || is_in(SUMS, word) || is_in(STATISTICS, word);
+    words.iter().all(|w| sums(w) || is_in(BESIDE, w))
+        && (below && !words.is_empty() || words.iter().any(sums))
 }
 
 /// What a header means, also behind the name of a structure or the word for a mean.
@@ -85,7 +94,7 @@ fn found(header: &str, row_of_units: Option<&str>) -> Option<Meaning> {
     let (target, unit) = meant(header, row_of_units).or_else(|| meant(inner()?, row_of_units))?;
     let deviation = matches!(target.id, Id::NormalForceSd | Id::LateralForceSd);
     let minutes = unit.as_ref().is_some_and(|(text, _)| text.ends_with("min"));
-    let statistic = |word: &str| is_statistic(&plain(word)) && !(minutes && plain(word) == "min");
+    let statistic = |word: &str| is_in(STATISTICS, &plain(word)) && !(minutes && plain(word) == "min");
     let is_word = |c: char| !c.is_alphanumeric();
     (deviation || !outside(header).split(is_word).any(statistic)).then_some((target, unit))
 }
@@ -104,9 +113,11 @@ fn outside(header: &str) -> String {
 /// column with a known name is not guessed.
 pub fn open_unit(grid: &Grid, index: usize) -> Option<(&'static Target, &str)> {
     let (header, row) = (&grid.header[index], unit_row(&grid.units, index));
-    let unit = stated(header).or(row).map(str::trim).filter(|unit| !unit.is_empty())?;
     let name = name_of(header);
     let target = Target::headed(&name)?;
+    let none = |unit: &&str| target.dimension().is_some_and(|d| Unit::guess(d, unit).is_none());
+    let unit = parts(header).map(|(_, unit)| unit).find(none).or_else(|| stated(header)).or(row);
+    let unit = unit.map(str::trim).filter(|unit| !unit.is_empty())?;
     // A letter alone has many meanings.
     let number = target.dimension().is_some() && name.len() > 1;
     (number && found(header, row).is_none()).then_some((target, unit))
@@ -130,33 +141,23 @@ pub fn heads(text: &str) -> bool {
 }
 
 /// Words that say how an amplitude is counted, longer ones before those that they contain.
-const STROKES: [(Id, &[&str]); 5] = [
+const STROKES: [(Id, &str); 5] = [
     (
         Id::AmplitudePp,
-        &[
-            "spitze-spitze",
-            "peak-to-peak",
-            "peak to peak",
-            "peak_to_peak",
-            "peaktopeak",
-            "peak-peak",
-            "peak peak",
-            "pk to pk",
-            "pk pk",
-        ],
+        "spitze-spitze,peak-to-peak,peak to peak,peak_to_peak,peaktopeak,peak-peak,peak peak,pk to pk,pk pk",
     ),
-    (Id::AmplitudePeak, &["zero-to-peak", "zero to peak"]),
-    (Id::AmplitudePp, &["pk-pk", "pk_pk", "p-p", "pkpk", "p2p", "ptp", "pp"]),
-    (Id::AmplitudePeak, &["zero_to_peak", "0-pk", "0-p", "peak", "pk"]),
-    (Id::AmplitudeRms, &["rms"]),
+    (Id::AmplitudePeak, "zero-to-peak,zero to peak"),
+    (Id::AmplitudePp, "pk-pk,pk_pk,p-p,pkpk,p2p,ptp,pp"),
+    (Id::AmplitudePeak, "zero_to_peak,0-pk,0-p,peak,pk"),
+    (Id::AmplitudeRms, "rms"),
 ];
 
 /// A header without the word for how an amplitude is counted, and which amplitude that is.
 fn without_stroke(header: &str) -> Option<(String, Id)> {
     let small = header.to_ascii_lowercase();
-    let all = STROKES.iter().flat_map(|(id, all)| all.iter().map(move |words| (id, words)));
+    let mut all = STROKES.iter().flat_map(|(id, all)| all.split(',').map(move |words| (id, words)));
     let apart = |c: Option<char>| c.is_none_or(|c| !c.is_alphanumeric());
-    all.into_iter().find_map(|(id, words)| {
+    all.find_map(|(id, words)| {
         let (before, behind) = small.split_once(words)?;
         let alone = apart(before.chars().next_back()) && apart(behind.chars().next());
         let behind = &header[before.len() + words.len()..];

@@ -82,17 +82,19 @@ impl Source {
         })
     }
 
-    /// The first row of the data. Rows of a word and its value above a row of words are no data, even where
-    /// the table is as narrow.
+    /// The first row of the data. Rows of a word and values above a row of words are no data, even where they
+    /// are as wide as the table.
     fn first(&self, rows: &[Row], usual: usize) -> usize {
         let first = rows.iter().position(|r| self.is_data(r, usual)).unwrap_or(rows.len());
-        let pair = |r: &Row| {
-            r.filled() == 2 && r.width() == 2 && !r.cells[0].is_number(self.comma) && self.numbers(r) == 1
+        let labelled = |r: &Row| {
+            r.width() == r.filled() && !r.cells[0].is_number(self.comma) && self.numbers(r) + 1 == r.filled()
         };
-        let table = (first..rows.len()).find(|k| self.is_data(&rows[*k], usual) && !pair(&rows[*k]));
-        let headed =
-            |k: &usize| rows[..*k].iter().rfind(|r| r.filled() > 0).is_some_and(|r| self.is_words(r));
-        table.filter(|k| *k > first && headed(k)).unwrap_or(first)
+        let table = (first..rows.len()).find(|k| self.is_data(&rows[*k], usual) && !labelled(&rows[*k]));
+        let headed = |k: usize| {
+            let above = rows[..k].iter().rfind(|r| r.filled() > 0);
+            above.is_some_and(|r| self.is_words(r) && 2 * r.filled() >= usual)
+        };
+        table.filter(|k| *k > first && headed(*k) && (usual == 2 || !headed(first))).unwrap_or(first)
     }
 
     /// Finds headers, units and data among rows: data begin with the first row of mostly numbers that is about as wide as most.
@@ -107,9 +109,13 @@ impl Source {
         let mut grid = Grid { format: self.format.clone(), comma: self.comma, ..Grid::default() };
         let extent = Extent { first, usual, wide };
         let taken = self.name_columns(&mut grid, &rows, &data, &extent);
-        for row in rows[..first - taken].iter().filter(|row| row.filled() > 0) {
+        let above: Vec<&Row> = rows[..first - taken].iter().filter(|row| row.filled() > 0).collect();
+        for row in above.iter().take(3) {
             let words = row.texts().join(" ");
             grid.notes.push(format!("row {} before the header was passed over: {}", row.place, words.trim()));
+        }
+        if above.len() > 3 {
+            grid.notes.push(format!("{} more rows before the header were passed over", above.len() - 3));
         }
         if grid.header.is_empty() {
             grid.notes.push("there is no header: columns are #1, #2, ...".into());

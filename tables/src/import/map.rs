@@ -134,7 +134,10 @@ pub fn stated(header: &str) -> Option<&str> {
 pub fn parts(header: &str) -> impl Iterator<Item = (&str, &str)> {
     let bracketed = |(open, close): (char, char)| {
         let (name, rest) = header.split_once(open)?;
-        Some((name, rest.split(close).next()?))
+        let (unit, behind) = rest.split_once(close).unwrap_or((rest, ""));
+        // A factor behind the bracket belongs to the unit, so that it is none that a header can state.
+        let factor = behind.contains(|c: char| c.is_ascii_digit() || "*×/".contains(c));
+        Some((name, if factor { &header[name.len()..] } else { unit }))
     };
     let brackets = [('[', ']'), ('(', ')')].into_iter().filter_map(bracketed);
     brackets.chain([" / ", ", ", " in ", "/"].into_iter().filter_map(|mark| header.split_once(mark)))

@@ -1,7 +1,7 @@
 //! Why a source is refused: columns that are missing, and tables of which most rows cannot be taken.
 
 use super::grid::Grid;
-use super::values::{Dropped, NO_NUMBER, NO_TIME};
+use super::values::{Dropped, NO_NUMBER, NO_TIME, NO_WAY};
 use super::{Import, map, units};
 
 impl Import<'_> {
@@ -20,6 +20,9 @@ impl Import<'_> {
             let names = not_taken.join(", ");
             help = format!("{help}\ncolumns of {} that are not taken: {names}", self.source);
         }
+        // Why there are no names, for one.
+        let notes = self.grid.notes.iter().map(|note| format!("\nnote: {note}"));
+        let help = notes.fold(help, |help, note| help + &note);
         miette::bail!(help = help + &across(self.grid).unwrap_or_default(), "{all}");
     }
 
@@ -81,6 +84,11 @@ fn remedy(grid: &Grid, dropped: &[Dropped], worst: Option<&Dropped>, padded: usi
             .to_string()
     } else if reason == NO_NUMBER {
         format!("'{text}' is no number: correct these cells at the source, or map another column")
+    } else if reason == NO_WAY {
+        let column = worst.map_or("", |d| &d.column);
+        format!(
+            "'{text}' is not known: state the two words, forward first, as in {column}=direction:hin/zurück"
+        )
     } else if reason == NO_TIME {
         "export the times as seconds, 12:34:56.7, 2024-03-01 12:34:56 or 01.03.2024 12:34:56".to_string()
     } else if grid.format.starts_with("text") {

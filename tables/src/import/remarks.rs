@@ -51,7 +51,7 @@ pub fn ranges(passes: &[Pass], columns: &[&'static str]) -> Vec<Range> {
         .collect()
 }
 
-/// A factor of a thousand or a million that brings a value among the usual ones.
+/// How a value is not among the usual ones: by a factor of a thousand or a million, or otherwise.
 fn slip(value: f64, [low, high]: [f64; 2]) -> Option<&'static str> {
     let within = |v: f64| v >= low && v <= high;
     if value <= 0.0 || within(value) {
@@ -65,20 +65,31 @@ fn slip(value: f64, [low, high]: [f64; 2]) -> Option<&'static str> {
     ]
     .into_iter()
     .find_map(|(factor, words)| within(value * factor).then_some(words))
+    .or(Some("unusual"))
 }
 
-/// Passes whose lateral force scatters as it does where the sliding turns within them.
-fn hidden_reversals(passes: &[Pass]) -> Option<String> {
+/// The first points of those passes, and how many more there are; `None` of none.
+fn points(passes: &[Pass], is: impl Fn(&Pass) -> bool) -> Option<(usize, String)> {
+    let all: Vec<String> = passes.iter().filter(|p| is(p)).map(|p| p.point.to_string()).collect();
+    let more = if all.len() > 5 { ", ..." } else { "" };
+    (!all.is_empty()).then(|| (all.len(), format!("{}{more}", all[..all.len().min(5)].join(", "))))
+}
+
+/// Passes whose lateral force scatters as it does where the sliding turns within them, or where a sample is
+/// wrong.
+fn scattered(passes: &[Pass]) -> Option<String> {
     let hidden =
-        |p: &&Pass| p.lateral_force_sd_n.zip(p.lateral_force_n).is_some_and(|(sd, f)| sd > HIDDEN * f.abs());
-    let count = passes.iter().filter(hidden).count();
-    (2 * count > passes.len()).then(|| {
+        |p: &Pass| p.lateral_force_sd_n.zip(p.lateral_force_n).is_some_and(|(sd, f)| sd > HIDDEN * f.abs());
+    let (count, points) = points(passes, hidden)?;
+    let scatters = format!("the lateral force scatters by more than {HIDDEN} times its mean in");
+    Some(if 2 * count > passes.len() {
         format!(
-            "the lateral force scatters within a pass by more than {HIDDEN} times its mean in {count} of {} passes: are reversals hidden \
-             in them? A position that counts the way up, or a speed without a sign, does not show them: map a position or a \
-             velocity with a sign",
+            "{scatters} {count} of {} passes: are reversals hidden in them? A position that counts the way up, or a speed without a sign, \
+             does not show them: map a position or a velocity with a sign",
             passes.len()
         )
+    } else {
+        format!("{scatters} point {points}: a bad sample, or hardly any friction?")
     })
 }
 
@@ -111,6 +122,13 @@ pub fn remarks(passes: &[Pass], columns: &[&'static str]) -> Vec<String> {
         list.push(format!(
             "lateral over normal force is {ratio}, {words} for friction: is the unit of one of them wrong?"
         ));
+    } else if let Some((_, points)) =
+        points(passes, |p| p.lateral_force_n.is_some_and(|f| f.abs() > RATIO[1] * p.normal_force_n))
+    {
+        list.push(format!(
+            "lateral over normal force is more than {} in point {points}: a bad reading?",
+            RATIO[1]
+        ));
     }
     let fastest = conditions.iter().map(|c| std::f64::consts::PI * c.frequency_hz * c.amplitude.metres());
     let fastest = fastest.fold(0.0, f64::max);
@@ -120,7 +138,7 @@ pub fn remarks(passes: &[Pass], columns: &[&'static str]) -> Vec<String> {
             number(fastest)
         ));
     }
-    list.extend(hidden_reversals(passes));
+    list.extend(scattered(passes));
     let runs: Vec<&str> = passes.iter().filter_map(|p| p.run.as_deref()).collect();
     if runs.len() == passes.len() && all_differ(runs) {
         list.push("every pass is a run of its own: if the column 'run' counts the rows, leave it out".into());

@@ -1,12 +1,13 @@
 //! Time series cut into passes: a stretch of steady sliding is one pass.
 //!
-//! The path is the position, or the integral of the velocity. Its turning points part it into legs; within a leg the local
-//! slope of the path is the velocity, and a sample is steady where velocity, load and vibration change by less than a tenth
-//! over the window about it. Steady samples in a row are a stretch; its beginning, in which friction settles, is left out.
+//! The path is the position, or the integral of the velocity. Its turning points and its rests part it into
+//! legs; within a leg the local slope of the path is the velocity, and a sample is steady where velocity,
+//! load and vibration differ by less than a tenth over the window about it. Steady samples in a row are a
+//! stretch; its beginning, in which friction settles, is left out.
 
 use super::targets::Id;
-use super::values::{Dropped, Values};
-use path::{path, turning_points, velocities};
+use super::values::{Dropped, Values, middle, sorted};
+use path::{at_rests, path, turning_points, velocities};
 use serde::Serialize;
 use steady::{mean, steady};
 
@@ -28,6 +29,8 @@ pub struct Cut {
 const FEWEST: usize = 10;
 /// Share of the largest speed below which the stage stands still.
 const STILL: f64 = 1e-4;
+/// Half a window is at least this fraction of a leg.
+const WINDOW: usize = 50;
 
 /// How a series was cut, and what became of its samples.
 #[derive(Clone, Debug, Default, Serialize)]
@@ -50,25 +53,42 @@ pub struct Counts {
     pub stretches: usize,
 }
 
-/// Cuts samples into passes. They must be in the order of time.
+/// Cuts samples into passes, each run by itself. The samples of a run must be in the order of time.
 ///
 /// # Errors
 /// In words: time that does not rise, no path, no steady stretch.
-pub fn cut(samples: &[Values], how: &Cut) -> Result<(Vec<Values>, Vec<Spread>, Counts), String> {
+pub fn cut(samples: &[Values], how: &Cut) -> Result<(Vec<(Values, Spread)>, Counts), String> {
+    let mut counts = Counts { cut: *how, samples: samples.len(), ..Counts::default() };
+    let mut passes = Vec::new();
+    for run in samples.chunk_by(|a, b| a.run == b.run) {
+        passes.extend(cut_run(run, &mut counts)?);
+    }
+    if passes.is_empty() {
+        return Err(format!(
+            "no steady stretch of sliding among {} samples: {} are of changing speed, load or vibration, {} of beginnings, {} in stretches \
+             of fewer than {FEWEST} samples",
+            counts.samples, counts.changing, counts.settling, counts.too_short
+        ));
+    }
+    Ok((passes, counts))
+}
+
+/// Cuts the samples of a run.
+fn cut_run(samples: &[Values], counts: &mut Counts) -> Result<Vec<(Values, Spread)>, String> {
+    let (how, mut passes) = (counts.cut, Vec::new());
     let times = rising(samples)?;
     let path = path(samples, &times)?;
     let turns = turning_points(&path);
     refuse_one_way(samples, &turns)?;
-    let reversals = turns.len().saturating_sub(2);
-    let mut counts = Counts { cut: *how, samples: samples.len(), reversals, ..Counts::default() };
-    let legs = turns.windows(2).map(|leg| (leg[0], velocities(&times, &path, leg[0], leg[1])));
-    let legs: Vec<(usize, (Vec<f64>, usize))> = legs.collect();
+    counts.reversals += turns.len().saturating_sub(2);
+    let legs = turns.windows(2).flat_map(|leg| at_rests(&times, &path, leg[0], leg[1]));
+    let legs: Vec<(usize, (Vec<f64>, usize))> =
+        legs.map(|(from, to)| (from, velocities(&times, &path, from, to, (to - from) / WINDOW))).collect();
     let fastest = legs.iter().flat_map(|(_, (slopes, _))| slopes).fold(0.0f64, |m, v| m.max(v.abs()));
     let ranges = legs.iter().flat_map(|(from, (v, half))| steady(samples, v, *half, *from, STILL * fastest));
     let ranges: Vec<(usize, usize)> = ranges.collect();
-    counts.stretches = ranges.len();
-    counts.changing = samples.len() - ranges.iter().map(|r| r.1 - r.0).sum::<usize>();
-    let (mut passes, mut spreads) = (Vec::new(), Vec::new());
+    counts.stretches += ranges.len();
+    counts.changing += samples.len() - ranges.iter().map(|r| r.1 - r.0).sum::<usize>();
     for (from, to) in ranges {
         let lasts = times[to - 1] - times[from];
         let settled = times[from] + how.settle_s.unwrap_or(0.2 * lasts);
@@ -86,22 +106,18 @@ pub fn cut(samples: &[Values], how: &Cut) -> Result<(Vec<Values>, Vec<Spread>, C
             if end - at < FEWEST || rest {
                 counts.too_short += end - at;
             } else {
-                let (pass, spread) = mean(&samples[at..end], &path[at..end], &times[at..end]);
-                passes.push(pass);
-                spreads.push(spread);
-                counts.in_passes += end - at;
+                let pass = mean(&samples[at..end], &path[at..end], &times[at..end]);
+                if pass.0.speed().is_some_and(|speed| speed > STILL * fastest) {
+                    passes.push(pass);
+                    counts.in_passes += end - at;
+                } else {
+                    counts.changing += end - at;
+                }
             }
             at = end;
         }
     }
-    if passes.is_empty() {
-        return Err(format!(
-            "no steady stretch of sliding among {} samples: {} are of changing speed, load or vibration, {} of beginnings, {} in stretches \
-             of fewer than {FEWEST} samples",
-            counts.samples, counts.changing, counts.settling, counts.too_short
-        ));
-    }
-    Ok((passes, spreads, counts))
+    Ok(passes)
 }
 
 /// The times of the samples, which must rise.
@@ -112,7 +128,7 @@ fn rising(samples: &[Values]) -> Result<Vec<f64>, String> {
     }
     if let Some(k) = times.windows(2).position(|w| w[1] <= w[0]) {
         let why = if times[k + 1] < times[k] {
-            "it goes back: give one record at a time"
+            "it goes back: map the column that numbers the steps (HEADER=run), or give one record at a time"
         } else {
             "samples share a stamp: the clock is too coarse; map time from a finer column, or from one that counts the samples at a \
              known rate (--map Sample=time:0.01s is a sample every 0.01 s)"
@@ -146,18 +162,24 @@ fn refuse_one_way(samples: &[Values], turns: &[usize]) -> Result<(), String> {
     }
 }
 
-/// Takes off what is no sample: rows in which a value is empty that most rows have, and a last sample that is
-/// the one before it once more, as some recorders write their end.
+/// Takes off what is no sample: rows in which a value is empty that most rows have, or is one that no pass
+/// can have; and a last sample that is the one before it once more, as some recorders write their end.
 pub fn unusable(samples: &mut Vec<Values>) -> Vec<Dropped> {
     let known = |id: Id| samples.iter().filter(|s| s.get(id).is_some()).count();
-    let motion = [Id::Time, Id::Position, Id::Velocity, Id::NormalForce];
+    let motion = [Id::Time, Id::Position, Id::Velocity, Id::Speed, Id::Direction, Id::NormalForce];
     let columns = motion.into_iter().chain([Id::LateralForce, Id::FrictionForce, Id::FrictionCoefficient]);
     let needed: Vec<Id> = columns.filter(|id| 2 * known(*id) > samples.len()).collect();
     let drop = |s: &Values, id: Id, reason: &str| s.drop(id.target().column, s.get(id), reason);
-    let empty = |s: &Values| needed.iter().copied().find(|id| s.get(*id).is_none());
-    let mut dropped: Vec<Dropped> =
-        samples.iter().filter_map(|s| Some(drop(s, empty(s)?, "empty"))).collect();
-    samples.retain(|s| empty(s).is_none());
+    let loads = samples.iter().filter_map(|s| s.get(Id::NormalForce)).map(f64::abs);
+    let load = middle(&sorted(loads.filter(|load| *load > 0.0)));
+    // What rests has no direction.
+    let rests = |s: &Values, id: Id| id == Id::Direction && s.speed() == Some(0.0);
+    let bad = |s: &Values| match needed.iter().copied().find(|id| s.get(*id).is_none() && !rests(s, *id)) {
+        Some(id) => Some(drop(s, id, "empty")),
+        None => s.implausible(load?),
+    };
+    let mut dropped: Vec<Dropped> = samples.iter().filter_map(bad).collect();
+    samples.retain(|s| bad(s).is_none());
     if let [.., before, last] = samples.as_slice()
         && last.get(Id::Time).is_some()
         && before.get(Id::Time) == last.get(Id::Time)

@@ -51,7 +51,7 @@ use Dimension as D;
 
 targets! {
     Point "point" "point" Count, "number of the pass", ["point" "no" "nr" "number" "index"];
-    Time "time" "time_s" Number(D::Time), "start of the pass", ["t" "time" "zeit" "timestamp" "elapsed" "elapsedtime" "testtime" "clock" "uhrzeit"];
+    Time "time" "time_s" Number(D::Time), "start of the pass", ["t" "time" "zeit" "timestamp" "elapsed" "elapsedtime" "testtime" "clock" "uhrzeit" "xvalue"];
     AmplitudePp "amplitude_pp" "amplitude_pp_m" Number(D::Length), "vibration amplitude, peak to peak", ["w" "wpp" "amp" "ampl" "amplitude" "amppp" "amplitudepp" "amplitudepeaktopeak" "amplitudep2p" "vibrationamplitude" "schwingungsamplitude"];
     AmplitudePeak "amplitude_peak" "amplitude_pp_m" Number(D::Length), "vibration amplitude, zero to peak: half of what the table holds", ["amplitudepeak" "amppeak" "amplitude0p" "amp0p" "amplitudezeropeak"];
     AmplitudeRms "amplitude_rms" "amplitude_pp_m" Number(D::Length), "vibration amplitude, root mean square of a sine", ["amplituderms" "amprms"];
@@ -61,13 +61,13 @@ targets! {
     Direction "direction" "direction" Way, "direction of sliding", ["direction" "dir" "richtung" "way" "sense"];
     Position "position" "position_m" Number(D::Length), "mean position along the plate", ["x" "pos" "position" "displacement" "disp" "stroke" "weg" "distance"];
     NormalForce "normal_force" "normal_force_n" Number(D::Force), "mean normal force, positive in compression", ["fn" "fz" "normalforce" "normal" "load" "normalload" "appliedload" "normalkraft" "anpresskraft" "forcez"];
-    LateralForce "lateral_force" "lateral_force_n" Number(D::Force), "mean lateral force, signed in the sensor's frame", ["ft" "fl" "fx" "lateralforce" "lateral" "tangentialforce" "tangential" "shearforce" "querkraft" "forcex" "flat"];
+    LateralForce "lateral_force" "lateral_force_n" Number(D::Force), "mean lateral force, signed in the sensor's frame", ["ft" "fl" "fx" "fy" "lateralforce" "lateral" "tangentialforce" "tangential" "shearforce" "querkraft" "forcex" "forcey" "flat"];
     FrictionForce "friction_force" "lateral_force_n" Number(D::Force), "friction force against the sliding, a magnitude", ["ff" "friction" "frictionforce" "reibkraft" "fr" "frictionalforce"];
     FrictionCoefficient "friction_coefficient" "lateral_force_n" Number(D::Ratio), "friction force over normal force, a magnitude", ["mu" "cof" "frictioncoefficient" "coefficientoffriction" "coefficient" "frictioncoeff" "reibzahl" "reibwert"];
     NormalForceSd "normal_force_sd" "normal_force_sd_n" Number(D::Force), "standard deviation of the normal force within the pass", ["fnsd" "fnstd" "normalforcesd" "normalforcestd"];
     LateralForceSd "lateral_force_sd" "lateral_force_sd_n" Number(D::Force), "standard deviation of the lateral force within the pass", ["ftsd" "ftstd" "lateralforcesd" "lateralforcestd"];
     Samples "samples" "samples" Count, "samples behind the means", ["samples" "nsamples" "n"];
-    Pressure "ambient_pressure" "ambient_pressure_pa" Number(D::Pressure), "ambient pressure", ["ambientpressure" "pressure" "airpressure" "luftdruck"];
+    Pressure "ambient_pressure" "ambient_pressure_pa" Number(D::Pressure), "ambient pressure", ["ambientpressure" "airpressure" "barometricpressure" "luftdruck"];
     Temperature "temperature" "temperature_c" Number(D::Temperature), "temperature", ["temperature" "temp" "temperatur"];
     Humidity "relative_humidity" "relative_humidity_pct" Number(D::Percentage), "relative humidity", ["relativehumidity" "humidity" "rh" "feuchte"];
     PhaseShift "phase_shift" "phase_shift_deg" Number(D::Angle), "contact phase shift", ["phaseshift" "phase"];

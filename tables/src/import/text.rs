@@ -4,6 +4,7 @@ use super::grid::{Grid, Row};
 use super::head::Source;
 use delimiter::Delimiter;
 use miette::IntoDiagnostic;
+use std::borrow::Cow;
 
 mod decimal;
 mod delimiter;
@@ -26,13 +27,16 @@ pub fn read(bytes: &[u8], marks: Marks) -> miette::Result<Grid> {
     // The typographic minus.
     let text = text.replace('\u{2212}', "-");
     let comment = |line: &str| line.starts_with(['#', '%', '!']) || line.starts_with("//");
-    let lines = (1..).zip(text.lines()).filter(|(_, line)| !line.trim().is_empty());
+    let joined = whole_lines(&text);
+    let lines =
+        joined.iter().map(|(place, line)| (*place, &**line)).filter(|(_, line)| !line.trim().is_empty());
     let (heads, data): (Vec<_>, Vec<_>) = lines.partition(|(_, line)| comment(line.trim_start()));
     let bare = |line: &str| line.trim_start().trim_start_matches(['#', '%', '!', '/']).trim().to_string();
     let remarks: Vec<(u64, String)> = heads.iter().map(|(place, line)| (*place, bare(line))).collect();
     let delimiter = Delimiter::find(&data, &remarks, marks)?;
     let rows = data.iter().map(|(place, line)| delimiter.row(*place, line));
-    let rows = rows.collect::<miette::Result<Vec<Row>>>()?;
+    let mut rows = rows.collect::<miette::Result<Vec<Row>>>()?;
+    decimal::ungroup(&mut rows, marks.decimal);
     let comments = remarks.iter().filter_map(|(place, line)| delimiter.row(*place, line).ok()).collect();
     let comma = decimal::decimal_comma(&rows, marks.decimal)?;
     let mark = if comma { ", decimal commas" } else { "" };
@@ -45,6 +49,19 @@ pub fn read(bytes: &[u8], marks: Marks) -> miette::Result<Grid> {
     Ok(grid)
 }
 
+/// The lines with their numbers; a line break in quotes, as of a name in a cell, is a blank.
+fn whole_lines(text: &str) -> Vec<(u64, Cow<'_, str>)> {
+    let odd = |line: &str| line.matches('"').count() % 2 == 1;
+    let (mut lines, mut all) = ((1..).zip(text.lines()), Vec::new());
+    while let Some((place, line)) = lines.next() {
+        let end = if odd(line) { lines.clone().take(4).position(|(_, line)| odd(line)) } else { None };
+        let more = lines.by_ref().take(end.map_or(0, |last| last + 1));
+        let whole = more.fold(Cow::from(line), |all, (_, line)| format!("{all} {line}").into());
+        all.push((place, whole));
+    }
+    all
+}
+
 /// The text and its encoding: by byte-order mark, UTF-8 where it is that, else Latin-1, in which any byte is a letter.
 fn decoded(bytes: &[u8]) -> miette::Result<(String, &'static str)> {
     let wide = |rest: &[u8], read: fn([u8; 2]) -> u16| {
@@ -54,9 +71,10 @@ fn decoded(bytes: &[u8]) -> miette::Result<(String, &'static str)> {
     match bytes {
         [0xff, 0xfe, rest @ ..] => wide(rest, u16::from_le_bytes),
         [0xfe, 0xff, rest @ ..] => wide(rest, u16::from_be_bytes),
+        [1..=255, 0, 1..=255, 0, ..] => wide(bytes, u16::from_le_bytes),
         [0xef, 0xbb, 0xbf, rest @ ..] => Ok((String::from_utf8(rest.to_vec()).into_diagnostic()?, "UTF-8")),
         _ if bytes.contains(&0) => miette::bail!(
-            help = "known formats: delimited text, Excel and OpenDocument, Parquet, NumPy (.npy)",
+            help = "known formats: delimited text, Excel, OpenDocument, Parquet, Arrow, NumPy (.npy), MAT (5 and 7.3), HDF5; export others as CSV",
             "this is neither text nor a binary format that is known"
         ),
         _ => Ok(match std::str::from_utf8(bytes) {

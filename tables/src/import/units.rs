@@ -2,7 +2,7 @@
 //! and rounds once, as if the SI value had been written; any other takes one multiplication or division more.
 
 use std::f64::consts::PI;
-use symbols::UNITS;
+use symbols::{UNITS, WORDS};
 
 mod symbols;
 
@@ -43,7 +43,7 @@ impl Dimension {
     pub const fn known(self) -> &'static str {
         match self {
             Dimension::Length => "m, mm, um, nm, cm, in, rev@20mm (turns on a radius)",
-            Dimension::Time => "s, ms, us, min, h, hh:mm, mm:ss",
+            Dimension::Time => "s, ms, us, min, h, d, hh:mm, mm:ss, mdy and dmy (dates with slashes)",
             Dimension::Frequency => "Hz, kHz, MHz, rpm, rad/s",
             Dimension::Speed => "m/s, mm/s, um/s, nm/s, mm/min, rpm@20mm and rad/s@20mm (turns on a radius)",
             Dimension::Force => {
@@ -160,8 +160,8 @@ impl Unit {
         })
     }
 
-    /// The unit that a header seems to state, whatever its case, and its spelling: `MN` is millinewton and
-    /// `mhz` megahertz, the readings that a tribometer can have.
+    /// The unit that a header seems to state, whatever its case, and its spelling: `MN` is millinewton, `mhz`
+    /// and `mHz` are megahertz, the readings that a tribometer can have.
     pub fn guess(dimension: Dimension, text: &str) -> Option<(String, Unit)> {
         let text = plain(text);
         // A number in a header is a range or a setting, as in `Fz (5 N)`: only a map can state a factor.
@@ -176,8 +176,9 @@ impl Unit {
             Dimension::Temperature => small.replace('c', "C").replace('f', "F").replace('k', "K"),
             _ => small,
         };
-        let mega_force = dimension == Dimension::Force && text == "MN";
-        [text, usual].into_iter().skip(usize::from(mega_force)).find_map(|t| {
+        let unusual =
+            matches!((dimension, text.as_str()), (Dimension::Force, "MN") | (Dimension::Frequency, "mHz"));
+        [text, usual].into_iter().skip(usize::from(unusual)).find_map(|t| {
             let unit = Self::parse(dimension, &t)?;
             Some((t, unit))
         })
@@ -217,9 +218,14 @@ fn factored(text: &str) -> Option<(f64, &str)> {
 
 /// Without brackets, with one spelling of micro and of 'per second'.
 fn plain(text: &str) -> String {
-    let text = text.trim().trim_matches(['[', ']', '(', ')']).trim_matches([',', ';', ' ']);
+    let text = text.trim().trim_matches(['[', ']', '(', ')']).trim_matches([',', ';', '.', ' ']);
     let text = text.replace(['µ', 'μ'], "u").replace('⁻', "-").replace('¹', "1");
-    let text = text.replace(['·', '*'], " ");
+    let mut text = text.replace(['·', '*'], " ");
+    let words: Vec<&str> = WORDS.split_ascii_whitespace().collect();
+    let small = text.to_lowercase();
+    if words.chunks(2).any(|word| small.contains(word[0])) {
+        text = words.chunks(2).fold(small, |all, word| all.replace(word[0], word[1]));
+    }
     for per in [" s^-1", " s-1", ".s^-1", ".s-1"] {
         if let Some(head) = text.strip_suffix(per) {
             return format!("{head}/s");

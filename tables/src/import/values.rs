@@ -12,6 +12,8 @@ use serde::Serialize;
 
 /// Why a cell of a number is not taken.
 pub const NO_NUMBER: &str = "no number";
+/// Why a cell of a direction is not taken.
+pub const NO_WAY: &str = "no direction: 1, -1, forward or backward is needed";
 /// Why a cell of a time is not taken.
 pub const NO_TIME: &str = "neither a number nor a time of day";
 
@@ -118,7 +120,7 @@ impl Values {
                 }
                 ColumnKind::Way => {
                     let text = cell.digits(grid.comma).unwrap_or_default();
-                    way(&text).ok_or_else(|| drop("no direction: 1, -1, forward or backward is needed"))?
+                    way(&text, &column.unit_text).ok_or_else(|| drop(NO_WAY))?
                 }
                 ColumnKind::Count => {
                     let whole = |v: &f64| v.fract() == 0.0 && (0.0..9e15).contains(v);
@@ -175,6 +177,19 @@ impl Values {
         let coefficient =
             || Some(direction * self.get(Id::FrictionCoefficient)? * self.get(Id::NormalForce)?);
         self.get(Id::LateralForce).or_else(friction).or_else(coefficient)
+    }
+
+    /// Why a sample cannot be one beside a typical `load` in N: sliding, standing still or without touch, it
+    /// has what no pass can have.
+    pub fn implausible(&self, load: f64) -> Option<Dropped> {
+        let mut probe = self.clone();
+        probe.put_motion(0.01, 1.0, self.lateral(1.0));
+        let normal = &mut probe.numbers[Id::NormalForce as usize];
+        if normal.abs() > 100.0 * load {
+            return Some(self.drop("normal_force_n", Some(*normal), "over a hundred median loads"));
+        }
+        *normal = load;
+        probe.pass(1).err().filter(|why| !why.reason.starts_with("empty"))
     }
 
     /// The row as one that is left out for what it has in a column.

@@ -8,7 +8,7 @@ use std::collections::BTreeMap;
 
 mod unfolded;
 
-use unfolded::{Percents, looked_through};
+use unfolded::{Part, looked_through};
 
 /// Days, as workbooks count time, in s.
 const DAY_S: f64 = 86_400.0;
@@ -19,14 +19,14 @@ const DAY_S: f64 = 86_400.0;
 /// A file that is none, a sheet that is not there, several sheets and none named.
 pub fn read(bytes: &[u8], sheet: Option<&str>) -> miette::Result<Grid> {
     use calamine::Reader;
-    let percents = looked_through(bytes)?;
+    let looked = looked_through(bytes)?;
     let mut book = calamine::open_workbook_auto_from_rs(std::io::Cursor::new(bytes)).into_diagnostic()?;
     let names = book.sheet_names();
     let named = match sheet {
         Some(name) => names.iter().find(|n| *n == name),
         None if names.len() == 1 => names.first(),
         None => {
-            let mut rows_of = |name: &str| sheet_rows(&mut book, name, bytes.len(), &percents);
+            let mut rows_of = |name: &str| sheet_rows(&mut book, name, bytes.len(), &looked.percents);
             let mut filled =
                 names.iter().filter(|name| rows_of(name).is_ok_and(|(rows, _)| !rows.is_empty()));
             filled.next().filter(|_| filled.next().is_none())
@@ -40,7 +40,7 @@ pub fn read(bytes: &[u8], sheet: Option<&str>) -> miette::Result<Grid> {
         };
         miette::bail!(help = format!("{help}: {listed}"), "{why}");
     };
-    let (rows, formulas) = sheet_rows(&mut book, &name, bytes.len(), &percents)?;
+    let (rows, formulas) = sheet_rows(&mut book, &name, bytes.len(), &looked.percents)?;
     // Numbers that were typed as text follow the mark of the country.
     let with_comma = |c: &Cell| {
         matches!(c, Cell::Text(t) if t.contains(',') && !t.contains('.'))
@@ -50,6 +50,11 @@ pub fn read(bytes: &[u8], sheet: Option<&str>) -> miette::Result<Grid> {
     let source =
         Source { format: format!("workbook, sheet '{name}'"), comma, places: true, ..Source::default() };
     let mut grid = source.find(rows);
+    let hides = looked.hides(&name);
+    let rows = std::mem::take(&mut grid.rows).into_iter();
+    let (gone, rows): (Vec<Row>, Vec<Row>) = rows.partition(|row| hides(row.place as usize - 1));
+    grid.rows = rows;
+    gone.iter().for_each(|row| grid.leave_out(row, "the workbook hides this row".into()));
     if formulas > 0 {
         grid.notes.push(format!(
             "{formulas} cells are formulas without a stored result: open the workbook in a spreadsheet program and save it there"
@@ -66,12 +71,20 @@ pub fn read(bytes: &[u8], sheet: Option<&str>) -> miette::Result<Grid> {
     Ok(grid)
 }
 
+/// The seconds of a duration as OpenDocument has it, `PT00H01M02.5S`.
+fn duration(text: &str) -> Option<f64> {
+    let (hours, rest) = text.strip_prefix("PT")?.split_once('H')?;
+    let (minutes, rest) = rest.split_once('M')?;
+    let [h, m, s] = [hours, minutes, rest.strip_suffix('S')?].map(|part| part.parse::<f64>().ok());
+    Some(h? * 3600.0 + m? * 60.0 + s?)
+}
+
 /// The rows of a sheet, from its first column that holds something, and how many cells are formulas without a result.
 fn sheet_rows(
     book: &mut calamine::Sheets<std::io::Cursor<&[u8]>>,
     name: &str,
     size: usize,
-    percents: &[Percents],
+    percents: &[Part],
 ) -> miette::Result<(Vec<Row>, usize)> {
     use calamine::{Data, DataRef, Reader, Sheets};
     let number = |v: f64, percent: bool| if percent { Cell::Percent(v) } else { Cell::Number(v) };
@@ -80,7 +93,8 @@ fn sheet_rows(
         Data::Float(v) => number(v, percent),
         Data::Bool(v) => number(f64::from(u8::from(v)), percent),
         Data::DateTime(v) => Cell::Clock(v.as_f64() * DAY_S),
-        Data::String(text) | Data::DateTimeIso(text) | Data::DurationIso(text) => Cell::of(&text),
+        Data::DurationIso(text) => duration(&text).map_or_else(|| Cell::of(&text), Cell::Clock),
+        Data::String(text) | Data::DateTimeIso(text) => Cell::of(&text),
         Data::Error(error) => Cell::Text(format!("{error}")),
         Data::Empty => Cell::Empty,
     };
@@ -195,11 +209,16 @@ mod tests {
             )
         };
         let row = |cells: &[String]| format!("<table:table-row>{}</table:table-row>", cells.concat());
+        let time = "<table:table-cell office:value-type=\"time\" office:time-value=\"PT00H01M02.5S\"/>";
         let rows = [
             row(&[name("t (s)"), name("COF (%)")]),
             row(&[cell("float", "1"), cell("percentage", "0.4")]),
             row(&[cell("float", "2"), cell("percentage", "0.5")]),
             row(&[cell("float", "3"), cell("float", "0.6")]),
+            row(&[time.into(), cell("float", "0.7")]),
+            row(&[cell("float", "4"), cell("float", "9")])
+                .replace("row>", "row table:visibility=\"filter\">")
+                .replacen("</table:table-row table:visibility=\"filter\">", "</table:table-row>", 1),
         ];
         let content = format!(
             "<?xml version=\"1.0\"?><office:document-content xmlns:office=\"urn:oasis:names:tc:opendocument:xmlns:office:1.0\" \
@@ -214,6 +233,51 @@ mod tests {
             packed(&[("mimetype", kind), ("content.xml", &content), ("META-INF/manifest.xml", manifest)]);
         let grid = read(&book, None).unwrap();
         let second: Vec<Cell> = grid.rows.iter().map(|r| r.cells[1].clone()).collect();
-        assert_eq!(second, [Cell::Percent(0.4), Cell::Percent(0.5), Cell::Number(0.6)]);
+        assert_eq!(second, [Cell::Percent(0.4), Cell::Percent(0.5), Cell::Number(0.6), Cell::Number(0.7)]);
+        assert_eq!(grid.rows[3].cells[0], Cell::Clock(62.5));
+        assert_eq!((grid.left_out[0].row, grid.left_out[0].text.as_str()), (6, "4 9"));
+    }
+
+    #[test]
+    fn rows_that_excel_hides_are_left_out_and_listed() {
+        let cells = |k: i32| format!("<c r=\"A{k}\"><v>{k}</v></c><c r=\"B{k}\"><v>0.5</v></c></row>");
+        let name = |at: &str, text: &str| format!("<c r=\"{at}\" t=\"inlineStr\"><is><t>{text}</t></is></c>");
+        let rows = (2..6).map(|k| match k {
+            3 => format!("<row r=\"3\" hidden=\"1\">{}", cells(k)),
+            k => format!("<row r=\"{k}\">{}", cells(k)),
+        });
+        let sheet = |rows: &str| {
+            format!(
+                "<worksheet xmlns=\"http://schemas.openxmlformats.org/spreadsheetml/2006/main\"><sheetData><row r=\"1\">{}{}</row>{rows}\
+                 </sheetData></worksheet>",
+                name("A1", "t (s)"),
+                name("B1", "COF")
+            )
+        };
+        // The order of the sheets is not that of their files.
+        let book = "<workbook xmlns=\"http://schemas.openxmlformats.org/spreadsheetml/2006/main\" \
+                    xmlns:r=\"http://schemas.openxmlformats.org/officeDocument/2006/relationships\"><sheets>\
+                    <sheet name=\"A &amp; B\" sheetId=\"1\" r:id=\"rId2\"/><sheet name=\"C\" sheetId=\"2\" r:id=\"rId1\"/></sheets></workbook>";
+        let kind = "http://schemas.openxmlformats.org/officeDocument/2006/relationships/worksheet";
+        let rels = format!(
+            "<Relationships xmlns=\"http://schemas.openxmlformats.org/package/2006/relationships\">\
+             <Relationship Id=\"rId1\" Type=\"{kind}\" Target=\"worksheets/sheet1.xml\"/>\
+             <Relationship Id=\"rId2\" Type=\"{kind}\" Target=\"/xl/worksheets/sheet2.xml\"/></Relationships>"
+        );
+        let (hides, shows) = (sheet(&rows.collect::<String>()), sheet(&format!("<row r=\"3\">{}", cells(3))));
+        let root = "<Relationships xmlns=\"http://schemas.openxmlformats.org/package/2006/relationships\"><Relationship Id=\"rId1\" \
+                    Type=\"http://schemas.openxmlformats.org/officeDocument/2006/relationships/officeDocument\" \
+                    Target=\"xl/workbook.xml\"/></Relationships>";
+        let book = packed(&[
+            ("_rels/.rels", root),
+            ("xl/workbook.xml", book),
+            ("xl/_rels/workbook.xml.rels", &rels),
+            ("xl/worksheets/sheet1.xml", &shows),
+            ("xl/worksheets/sheet2.xml", &hides),
+        ]);
+        let read = |sheet: &str| read(&book, Some(sheet)).unwrap();
+        let places = |grid: &Grid| grid.rows.iter().map(|r| r.place).collect::<Vec<_>>();
+        assert_eq!((places(&read("A & B")), places(&read("C"))), (vec![2, 4, 5], vec![3]));
+        assert_eq!(read("A & B").left_out[0].reason, "the workbook hides this row");
     }
 }

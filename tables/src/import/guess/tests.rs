@@ -178,3 +178,100 @@ fn a_speed_a_thousand_times_too_large_is_remarked_on() {
     let said = imported(&text, "v=velocity:m/s", "amplitude_pp=0", false).unwrap().log.remarks.concat();
     assert!(said.contains("speed_m_s: 20000 mm/s is a thousand times too large"), "{said}");
 }
+
+#[test]
+fn a_factor_behind_the_unit_leaves_a_column_open() {
+    for header in [
+        "Fx [N] x10",
+        "Fx [N] (gain 10)",
+        "Fz [N] (x100)",
+        "Amplitude pp [um] /10",
+        "Fz [N]*1000",
+        "Fz (N) × 2",
+    ] {
+        assert_eq!(targets(header), "", "{header}");
+    }
+    assert_eq!(targets("Fz [N] (left)"), "\"Fz [N] (left)\"=normal_force:N");
+    let said = beside("Fz (N);Fx [N] x10", "0.25;{fx}").unwrap_err();
+    assert!(said.contains("'Fx [N] x10' was left open: '[N] x10' is not a unit of lateral_force"), "{said}");
+    let said = beside("Fz (comp. +) [mN];Fx [N]", "0.25;{fx}").unwrap_err();
+    assert!(said.contains("was left open: 'comp. +' is not a unit of normal_force"), "{said}");
+}
+
+#[test]
+fn a_choice_is_left_to_the_reader_and_named() {
+    let said = beside("Fz (N);Fx (N);Fy (N)", "0.25;0.01;{fx}").unwrap_err();
+    assert!(said.contains("'Fx (N)' or 'Fy (N)': map one of them"), "{said}");
+    let said = beside("Load (N);Fz (N);Fx (N)", "0.25;0.25;{fx}").unwrap_err();
+    assert!(said.contains("'Load (N)' or 'Fz (N)': map one of them"), "{said}");
+    let said = beside("Fz (N);Fx (N);Fx (N)", "0.25;{fx};{fx}").unwrap_err();
+    assert!(said.contains("'#4' or '#5': map one of them"), "{said}");
+    assert_eq!(targets("Fy (N)"), "\"Fy (N)\"=lateral_force:N");
+}
+
+#[test]
+fn the_pressure_of_a_contact_is_not_that_of_the_air() {
+    for header in ["Pressure [kPa]", "Pressure [MPa]", "Contact pressure [kPa]"] {
+        assert_eq!(targets(header), "", "{header}");
+    }
+    assert_eq!(targets("Air pressure [kPa]"), "\"Air pressure [kPa]\"=ambient_pressure:kPa");
+}
+
+#[test]
+fn sizes_that_no_tribometer_has_are_remarked_on() {
+    assert_eq!(targets("Frequency [mHz]"), "\"Frequency [mHz]\"=frequency:MHz");
+    let text = table("t (s);v (mm/s);Fz (N);Fx (N);w (um);f (Hz)", "{t};{v};0.25;{fx};1.5;2.75e-5");
+    let said = imported(&text, "", "", false).unwrap().log.remarks.concat();
+    assert!(said.contains("kHz is unusual for a tribometer"), "{said}");
+    // Serial days, and clocks without colons, under a bare name.
+    for time in ["45352.50", "1159"] {
+        let text = table("Time;v (mm/s);Fz (N);Fx (N)", "?{v};0.25;{fx}");
+        let text = text.split('?').enumerate().fold(String::new(), |all, (k, part)| match k {
+            0 => part.to_string(),
+            k => format!("{all}{time}{k:02};{part}"),
+        });
+        let said = imported(&text, "", "amplitude_pp=0", false).unwrap().log.remarks.concat();
+        assert!(said.contains("days of a spreadsheet (HEADER=time:d)"), "{said}");
+    }
+    // One reading at the end of its range among others.
+    let text = table("t (s);v (mm/s);Fz (N);Fx (N)", "{t};{v};0.5;{fx}").replacen(";-0.1025", ";-32.767", 1);
+    let said = imported(&text, "", "amplitude_pp=0", false).unwrap().log.remarks.concat();
+    assert!(said.contains("lateral over normal force is more than 20 in point"), "{said}");
+}
+
+#[test]
+fn words_of_a_direction_are_understood_or_stated() {
+    let directed = |forward: &str, backward: &str, map: &str| {
+        let row = |k: usize| [forward, backward][k % 2];
+        let text = table("t (s);Speed (mm/s);Fz (N);Fx (N);Dir", "{t};20;0.25;{fx};?");
+        let text = text.split('?').enumerate().fold(String::new(), |all, (k, part)| match k {
+            0 => part.to_string(),
+            k => format!("{all}{}{part}", row(k - 1)),
+        });
+        imported(&text, map, "amplitude_pp=0", false)
+    };
+    for (forward, backward) in [("1", "0"), ("F", "R"), ("A", "B"), ("hin", "rück"), ("CW", "CCW")] {
+        let said = directed(forward, backward, "").unwrap_err();
+        assert!(
+            said.contains("is not known: state the two words, forward first, as in Dir=direction:hin/zurück"),
+            "{forward}: {said}"
+        );
+        let made = directed(forward, backward, &format!("Dir=direction:{forward}/{backward}")).unwrap();
+        assert_eq!((made.log.passes, made.log.remarks.len()), (24, 0), "{forward}");
+        assert!(made.log.map_argument.contains(&format!("Dir=direction:{forward}/{backward}")));
+    }
+    // A few marks of failed readings are rows that are left out.
+    let text = table("t (s);Speed (mm/s);Fz (N);Fx (N);Dir", "{t};20;0.25;{fx};fwd");
+    let log = imported(&text.replacen("fwd", "??", 1), "", "amplitude_pp=0", false).unwrap().log;
+    assert_eq!((log.passes, log.dropped.len()), (23, 1));
+}
+
+#[test]
+fn what_was_passed_over_is_said_with_a_refusal() {
+    let text = table("t (s);v (mm/s);Fz (N)", "{t};{v};0.25;{fx}");
+    let said = imported(&text, "", "amplitude_pp=0", false).unwrap_err();
+    assert!(said.contains("row 1 has 3 names over rows of 4 cells"), "{said}");
+    // Names that are broken within quotes are whole.
+    let text = table("t (s);v (mm/s);\"Fz\n(N)\";\"Fx\n(N)\"", "{t};{v};0.25;{fx}");
+    assert_eq!(imported(&text, "", "amplitude_pp=0", false).unwrap().log.passes, 24);
+}

@@ -4,7 +4,6 @@ use super::{Extent, ONE_TEXT, Source};
 use crate::import::grid::{Block, Cell, Grid, Row};
 use crate::import::guess::{heads, name_of, sums_up};
 use crate::import::map::{stated, unit_row};
-use crate::import::targets::plain;
 use crate::import::units::is_unit;
 
 impl Source {
@@ -143,13 +142,13 @@ impl Source {
 /// have in succession, or that half of the rows have, is a value of its column.
 pub fn leave_out_summaries(grid: &mut Grid) {
     let rows = std::mem::take(&mut grid.rows);
-    let mut sums = vec![None; rows.len()];
+    let mut sums: Vec<Option<String>> = vec![None; rows.len()];
     for column in 0..rows.iter().map(|r| r.cells.len()).max().unwrap_or(0) {
-        let word = |row: &Row| match row.cells.get(column) {
-            Some(Cell::Text(t)) if t.starts_with(char::is_alphabetic) => {
-                Some(plain(t)).filter(|w| sums_up(w))
-            }
-            _ => None,
+        let mut below = false;
+        let word = |row: &Row| {
+            let Some(Cell::Text(text)) = row.cells.get(column) else { return None };
+            below = text.contains(char::is_alphabetic) && sums_up(text, below);
+            below.then(|| text.clone())
         };
         let words: Vec<Option<String>> = rows.iter().map(word).collect();
         let values: Vec<&String> =

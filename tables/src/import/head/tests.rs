@@ -74,3 +74,76 @@ fn a_word_and_its_value_above_a_narrow_table_are_no_data() {
         );
     }
 }
+
+#[test]
+fn rows_of_statistics_are_no_passes_in_other_words_too() {
+    let named = table("Probe;v (mm/s);Fz (N);Fx (N)", "P{k};{v};0.25;{fx}");
+    for words in [
+        "MW",
+        "Ø",
+        "StAbw.",
+        "STDEV.S",
+        "Durchschnitt",
+        "Mittelwerte",
+        "arith. Mittel",
+        "Gesamt",
+        "Spannweite",
+        "Streuung",
+        "Varianz",
+        "Variance",
+        "Range",
+        "CV",
+        "CV %",
+        "RSD",
+        "RMS",
+        "Mean (40)",
+        "Mean (n=40)",
+        "Mean of 40",
+        "Mean ± SD",
+        "mean_all",
+        "Standard error",
+        "95% CI",
+        "overall",
+        "x̄",
+        "σ",
+        "moyenne",
+        "écart-type",
+        "Media",
+        "Promedio",
+        "Mean;20;0.25;0.1\nn",
+        "Mean;20;0.25;0.1\nN",
+    ] {
+        let text = format!("{named}{words};20;0.25;0.1\n");
+        let log = imported(&text, "", "amplitude_pp=0,time_s=rows", false).unwrap().log;
+        assert_eq!(log.passes, 24, "{words}");
+    }
+    for name in ["Max Weber", "N", "n1", "A range of mine", "40 N"] {
+        let text = format!("{named}{name};20;0.25;0.1\n");
+        assert_eq!(
+            imported(&text, "", "amplitude_pp=0,time_s=rows", false).unwrap().log.passes,
+            25,
+            "{name}"
+        );
+    }
+}
+
+/// The header of a LabVIEW measurement: words and then numbers, as wide as the table.
+#[test]
+fn a_header_below_rows_of_a_word_and_numbers_heads_the_table() {
+    let rows = table("X_Value\tv (mm/s)\tFz (N)\tFx (N)\tComment", "{t}\t{v}\t0.25\t{fx}");
+    let text = format!(
+        "LabVIEW Measurement\t\nSeparator\tTab\nDate\t2024/03/01\n***End_of_Header***\t\n\t\nChannels\t3\t\t\t\n\
+         Samples\t24\t24\t24\t\nDate\t2024/03/01\t2024/03/01\t2024/03/01\t\nX_Dimension\tTime\tTime\tTime\t\n\
+         X0\t0.0E+0\t0.0E+0\t0.0E+0\t\nDelta_X\t1.0\t1.0\t1.0\t\n***End_of_Header***\t\t\t\t\n{rows}"
+    );
+    let log = imported(&text, "", "amplitude_pp=0", false).unwrap().log;
+    assert_eq!((log.passes, log.map[0].from.as_str()), (24, "X_Value"));
+}
+
+#[test]
+fn lines_before_a_header_are_counted_and_three_are_shown() {
+    let text = format!("{}{}", "a word;another\n".repeat(9), whole());
+    let notes = imported(&text, "", "amplitude_pp=0", false).unwrap().log.notes;
+    assert!(notes.iter().any(|n| n.contains("6 more rows before the header were passed")), "{notes:?}");
+    assert_eq!(notes.iter().filter(|n| n.contains("header was passed over")).count(), 3);
+}

@@ -4,12 +4,17 @@
 use super::{Map, Taken, unit_row};
 use crate::import::clock::is_time;
 use crate::import::grid::{Cell, Grid, Row};
-use crate::import::guess::{open_unit, stroke, unit_of};
+use crate::import::guess::{open_unit, stroke, taken, unit_of};
 use crate::import::targets::Id;
 use crate::import::units::Unit;
 
 /// Why columns with a name of that column of the point table were not guessed.
 pub(super) fn open(map: &Map, grid: &Grid, column: &str) -> String {
+    let choice = map.free(grid).filter_map(|k| taken(grid, k)).filter(|t| t.target.column == column);
+    let choice: Vec<String> = choice.map(|t| format!("'{}'", t.header)).collect();
+    if choice.len() > 1 {
+        return format!("; {}: map one of them", choice.join(" or "));
+    }
     let why = |k: usize| {
         let (target, unit) = open_unit(grid, k).filter(|(target, _)| target.column == column)?;
         let (name, header) = (target.name, &grid.header[k]);
@@ -62,8 +67,14 @@ pub fn contradicted(map: &Map, grid: &Grid) -> Vec<String> {
     let assumed = |c: &Taken| {
         // A clock's times have their unit.
         let clock = grid.rows.iter().any(|r| grid.cell(r, c.index).is_some_and(is_time));
-        (c.assumed && c.target.dimension().is_some() && !clock)
-            .then(|| format!("{}: no unit stated, {} assumed", c.header, c.unit_text))
+        let numbers =
+            grid.rows.iter().filter_map(|r| Unit::SI.apply(&grid.cell(r, c.index)?.digits(grid.comma)?));
+        // Days of a spreadsheet or of MATLAB, and hours, minutes and seconds in one number, are of this size.
+        let serial = c.target.id == Id::Time && (1e4..1e6).contains(&numbers.fold(f64::INFINITY, f64::min));
+        let days = ": they may be days of a spreadsheet (HEADER=time:d), or a clock without colons (115950 is 11:59:50)";
+        (c.assumed && c.target.dimension().is_some() && !clock).then(|| {
+            format!("{}: no unit stated, {} assumed{}", c.header, c.unit_text, if serial { days } else { "" })
+        })
     };
     let of_column = |c: &Taken| [unit(c), counted(c), assumed(c), nameless(c, grid)].into_iter().flatten();
     map.columns.iter().flat_map(of_column).collect()

@@ -97,6 +97,10 @@ fn target_of(text: &str, written: Option<&str>) -> Result<(&'static Target, Unit
     let target = Target::named(name).ok_or_else(|| MapError::Target(own()))?;
     let Some(dimension) = target.dimension() else {
         return match unit_text {
+            // The words for forward and backward.
+            Some(words) if target.kind == ColumnKind::Way && words.matches('/').count() == 1 => {
+                Ok((target, Unit::SI, words.into()))
+            }
             Some(unit) => Err(MapError::Unitless { name: own(), unit: unit.into() }),
             None => Ok((target, Unit::SI, String::new())),
         };
@@ -158,7 +162,7 @@ fn constant(entry: &str) -> Result<Option<Constant>, MapError> {
     let bad = || MapError::SetValue { name: name.into(), value: number.into() };
     let value = match target.kind {
         ColumnKind::Text => f64::NAN,
-        ColumnKind::Way => way(number).ok_or_else(bad)?,
+        ColumnKind::Way => way(number, "").ok_or_else(bad)?,
         ColumnKind::Count => return Err(MapError::SetCount(name.into())),
         ColumnKind::Number(dimension) => {
             // A value without a unit is SI, as the columns of the point table are.
@@ -170,8 +174,16 @@ fn constant(entry: &str) -> Result<Option<Constant>, MapError> {
     Ok(Some(Constant { target, text: text.to_string(), value }))
 }
 
-/// A direction as people write it.
-pub fn way(text: &str) -> Option<f64> {
+/// A direction as people write it, or as `words` state it (`hin/zurück`: forward first).
+pub fn way(text: &str, words: &str) -> Option<f64> {
+    if let Some((forward, backward)) = words.split_once('/') {
+        let number = |text: &str| Unit::SI.apply(text);
+        let same = |word: &str| {
+            word.trim().eq_ignore_ascii_case(text.trim())
+                || number(word).is_some_and(|n| number(text) == Some(n))
+        };
+        return if same(forward) { Some(1.0) } else { same(backward).then_some(-1.0) };
+    }
     match text.trim().to_lowercase().as_str() {
         "forward" | "fwd" | "f" | "trace" | "vor" | "vorwärts" => return Some(1.0),
         "backward" | "bwd" | "b" | "retrace" | "reverse" | "rev" | "zurück" | "rückwärts" => {

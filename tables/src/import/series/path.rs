@@ -7,8 +7,10 @@ use crate::import::values::{Values, middle, sorted};
 const TURN: f64 = 0.05;
 /// Relative standard error of a velocity that is good enough: a change of a tenth is several of them.
 const SLOPE_KNOWN: f64 = 0.015;
-/// Half window within a leg, as a share of its samples, and the fewest.
-const WINDOW: (usize, usize) = (50, 3);
+/// Fewest samples of half a window.
+const FEWEST: usize = 3;
+/// Share of a leg's largest speed that is moving; what moves rests again below a fifth of it.
+const MOVING: f64 = 0.1;
 
 /// The sums of the first values, from none to all of them.
 pub fn sums(values: impl Iterator<Item = f64>) -> Vec<f64> {
@@ -68,10 +70,36 @@ pub fn turning_points(path: &[f64]) -> Vec<usize> {
     turns
 }
 
-/// Velocity of every sample of a leg, and the half window that it took: from a small share of the leg on, the window is doubled
-/// until the slope is known well enough to see a change of a tenth, or it is a sixth of the leg.
-pub fn velocities(times: &[f64], path: &[f64], from: usize, to: usize) -> (Vec<f64>, usize) {
-    let mut half = ((to - from) / WINDOW.0).max(WINDOW.1);
+/// The pieces of a leg in which the stage moves, and those in which it rests.
+pub fn at_rests(times: &[f64], path: &[f64], from: usize, to: usize) -> Vec<(usize, usize)> {
+    let (slopes, _) = velocities(times, path, from, to, FEWEST);
+    let fastest = slopes.iter().fold(0.0f64, |m, v| m.max(v.abs()));
+    let mut moves = false;
+    let moving = slopes.iter().map(|v| {
+        moves = v.abs() > if moves { 0.2 * MOVING } else { MOVING } * fastest;
+        moves
+    });
+    pieces(moving, from).map(|(_, piece)| piece).collect()
+}
+
+/// Samples from number `from` on in a row of one state: that state, and the range.
+pub fn pieces(
+    states: impl Iterator<Item = bool>,
+    from: usize,
+) -> impl Iterator<Item = (bool, (usize, usize))> {
+    let (states, mut end): (Vec<bool>, _) = (states.collect(), from);
+    let piece = |run: &[bool]| {
+        end += run.len();
+        (run[0], (end - run.len(), end))
+    };
+    states.chunk_by(|a, b| a == b).map(piece).collect::<Vec<_>>().into_iter()
+}
+
+/// Velocity of every sample of a leg, and the half window that it took: from `least` on, the window is
+/// doubled until the slope of moving is known well enough to see a change of a tenth, or it is a sixth of the
+/// leg.
+pub fn velocities(times: &[f64], path: &[f64], from: usize, to: usize, least: usize) -> (Vec<f64>, usize) {
+    let mut half = least.max(FEWEST);
     loop {
         let (slopes, uncertainty) = slopes(times, path, from, to, half);
         if uncertainty <= SLOPE_KNOWN || 6 * 2 * half > to - from {
@@ -82,7 +110,8 @@ pub fn velocities(times: &[f64], path: &[f64], from: usize, to: usize) -> (Vec<f
 }
 
 /// Slope of the path about every sample of a leg, by least squares over the window, and the median of its
-/// relative standard error. Sums from the leg's start make every window a difference of two.
+/// relative standard error where it is no rest. Sums from the leg's start make every window a difference of
+/// two.
 fn slopes(times: &[f64], path: &[f64], from: usize, to: usize, half: usize) -> (Vec<f64>, f64) {
     let centre = from + (to - from) / 2;
     let mut sums = vec![[0.0; 5]];
@@ -103,5 +132,8 @@ fn slopes(times: &[f64], path: &[f64], from: usize, to: usize, half: usize) -> (
         (slope, (scatter / bottom).sqrt() / slope.abs())
     };
     let (slopes, errors): (Vec<f64>, Vec<f64>) = (0..to - from).map(slope).unzip();
-    (slopes, middle(&sorted(errors.into_iter())).unwrap_or(0.0))
+    let fastest = slopes.iter().fold(0.0f64, |m, v| m.max(v.abs()));
+    let moving = slopes.iter().zip(errors).filter(|(v, _)| v.abs() > 0.2 * MOVING * fastest);
+    let error = middle(&sorted(moving.map(|(_, error)| error))).unwrap_or(0.0);
+    (slopes, error)
 }

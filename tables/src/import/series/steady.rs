@@ -1,8 +1,8 @@
 //! Stretches of steady sliding, and the pass that each of them is.
 
-use super::path::sums;
+use super::path::{pieces, sums};
 use crate::import::targets::Id;
-use crate::import::values::{Values, mean as average};
+use crate::import::values::{Values, mean as average, sorted};
 use models::pass::Pass;
 
 /// Relative change over the window about a sample from which it is not steady.
@@ -20,20 +20,17 @@ pub fn steady(samples: &[Values], slopes: &[f64], h: usize, from: usize, still: 
     };
     let known = |id: &Id| samples[from..to].iter().any(|s| s.get(*id).is_some());
     let vibration = [Id::AmplitudePp, Id::AmplitudePeak, Id::AmplitudeRms, Id::Frequency];
-    let mut tracks: Vec<Vec<f64>> = vec![slopes.to_vec(), smooth(Id::NormalForce)];
+    let mut tracks: Vec<Vec<f64>> = vec![smooth(Id::NormalForce)];
     tracks.extend(vibration.into_iter().filter(known).map(smooth));
     let is_steady = |k: usize| {
         let (a, b) = (k.saturating_sub(h), (k + h).min(n - 1));
         let same = |v: &Vec<f64>| (v[b] - v[a]).abs() <= STEADY * v[k].abs();
-        slopes[k].abs() > still && tracks.iter().all(same) && samples[from + a].run == samples[from + b].run
+        // The slope is smooth over the window: five places see a rest between its ends.
+        let places = sorted((0..5).map(|j| slopes[a + j * (b - a) / 4]));
+        let moves = slopes[k].abs() > still && places[4] - places[0] <= STEADY * slopes[k].abs();
+        moves && tracks.iter().all(same)
     };
-    let steady: Vec<bool> = (0..n).map(is_steady).collect();
-    let mut end = from;
-    let ranges = steady.chunk_by(|a, b| a == b).filter_map(|run| {
-        end += run.len();
-        run[0].then_some((end - run.len(), end))
-    });
-    ranges.collect()
+    pieces((0..n).map(is_steady), from).filter_map(|(steady, piece)| steady.then_some(piece)).collect()
 }
 
 /// One pass of a stretch: means, and the speed as the slope of the path.

@@ -4,6 +4,31 @@ use super::delimiter::is_number;
 use crate::import::grid::{Cell, Row};
 use crate::import::units::Unit;
 
+/// Takes marks between thousands out of numbers: those that are no decimal mark anywhere, and the other one
+/// of point and comma where the decimal mark is stated.
+pub fn ungroup(rows: &mut [Row], decimal: Option<char>) {
+    let other = decimal.map(|mark| if mark == ',' { '.' } else { ',' });
+    let marks =
+        ['\'', '’', '\u{a0}', '\u{202f}'].into_iter().chain(other).filter(|mark| decimal != Some(*mark));
+    let marks: Vec<char> = marks.collect();
+    let bare = |text: &str| {
+        let mark = *marks.iter().find(|mark| text.contains(**mark))?;
+        let (whole, behind) =
+            text.split_at(text.find(|c| ",.".contains(c) && c != mark).unwrap_or(text.len()));
+        let mut groups = whole.trim_start_matches(['-', '+']).split(mark);
+        let head = groups.next().filter(|head| (1..=3).contains(&head.len()) && !head.starts_with('0'));
+        let grouped = head.is_some() && groups.all(|group| group.len() == 3) && !behind.contains(mark);
+        Some(text.replace(mark, "")).filter(|bare| grouped && is_number(bare))
+    };
+    for cell in rows.iter_mut().flat_map(|row| &mut row.cells) {
+        if let Cell::Text(text) = cell
+            && let Some(bare) = bare(text)
+        {
+            *text = bare;
+        }
+    }
+}
+
 /// Whether the decimal mark is a comma: one stands where a point would, and no number has a point.
 pub fn decimal_comma(rows: &[Row], stated: Option<char>) -> miette::Result<bool> {
     if let Some(mark) = stated {

@@ -32,6 +32,14 @@ impl Delimiter {
     pub fn find(data: &[(u64, &str)], remarks: &[(u64, String)], marks: Marks) -> miette::Result<Self> {
         // A decimal mark that is stated does not separate cells.
         let serves = |c: &char| marks.delimiter.map_or(marks.decimal != Some(*c), |d| d == *c);
+        // Blanks that are single tabs separate nothing that tabs do not.
+        let by_tabs = |line: &str| {
+            let cells = line.split('\t').filter(|c| !c.trim().is_empty());
+            line.contains('\t') && !line.contains("\t\t") && cells.count() == words(line).len()
+        };
+        let tabs = marks.delimiter.is_none()
+            && 2 * data.iter().filter(|(_, line)| by_tabs(line)).count() > data.len();
+        let serves = |c: &char| serves(c) && !(tabs && *c == ' ');
         let tried: Vec<char> = DELIMITERS.iter().map(|(c, _)| *c).filter(serves).collect();
         let tried = if tried.is_empty() { marks.delimiter.into_iter().collect() } else { tried };
         // The largest share of numbers in rows of one width; of equals the first.
@@ -173,11 +181,15 @@ fn score(lines: &[(u64, &str)], remarks: &[(u64, String)], delimiter: char) -> f
     let numbers = cells.clone().filter(|c| number(c)).count();
     let count = cells.count().max(1);
     let mostly = |c: &Vec<String>| 2 * c.iter().filter(|c| number(c)).count() >= c.len();
-    let first = split.iter().position(mostly).unwrap_or(0);
-    let as_wide = |line: &str| cells_of(line, Some(delimiter), usual).is_ok_and(|c| c.len() == usual);
-    let fits = match lines.get(first.wrapping_sub(1)) {
-        Some((_, line)) => as_wide(line),
-        None => remarks.is_empty() || remarks.iter().any(|(_, line)| as_wide(line)),
+    // A header may name a last column that is empty.
+    let wide = |n: usize| n == usual || delimiter == '\t' && n > usual;
+    let as_wide = |line: &str| cells_of(line, Some(delimiter), usual).is_ok_and(|c| wide(c.len()));
+    let fits = if split.first().is_none_or(mostly) {
+        remarks.is_empty() || remarks.iter().any(|(_, line)| as_wide(line))
+    } else {
+        let begins = |k: &usize| mostly(&split[*k]) && !mostly(&split[*k - 1]);
+        let mut headed = (1..split.len()).filter(begins).filter_map(|k| lines.get(k - 1));
+        headed.any(|(_, line)| as_wide(line))
     };
     let share = alike.len() as f64 / split.len().max(1) as f64 * numbers as f64 / count as f64;
     if fits { share } else { 0.5 * share }

@@ -36,6 +36,8 @@ fn delimiter_and_decimal_mark_are_found() {
 fn encodings_are_told_apart() {
     let latin = b"w [\xb5m];F\n1,5;2\n2;3\n";
     assert_eq!(read(latin, Marks::default()).unwrap().header[0], "w [µm]");
+    let bare: Vec<u8> = "w\tF\n1.5\t2\n2\t3\n".encode_utf16().flat_map(u16::to_le_bytes).collect();
+    assert_eq!(read(&bare, Marks::default()).unwrap().header, ["w", "F"]);
     let mut wide = vec![0xff, 0xfe];
     wide.extend("w [µm]\tF\n1.5\t2\n2\t3\n".encode_utf16().flat_map(u16::to_le_bytes));
     let wide = read(&wide, Marks::default()).unwrap();
@@ -75,5 +77,27 @@ fn a_mark_that_may_part_thousands_is_refused() {
 fn quoted_decimal_commas_are_read_beside_commas() {
     for text in ["a,b\n\"1,5\",2\n-3,\"0,4\"\n", "\"a\",\"b\"\n\"1,5\",\"2,0\"\n\"-3,0\",\"0,4\"\n"] {
         assert_eq!(numbers(&grid(text)), [[1.5, 2.0], [-3.0, 0.4]], "{text}");
+    }
+}
+
+#[test]
+fn marks_of_thousands_are_read_where_nothing_else_can_be_meant() {
+    let read = |text: &str, decimal| read(text.as_bytes(), Marks { decimal, ..Marks::default() });
+    for (number, decimal) in [
+        ("1.234,5", Some(',')),
+        ("1,234.5", Some('.')),
+        ("1'234.5", None),
+        ("1’234.5", None),
+        ("1\u{a0}234.5", None),
+        ("1\u{202f}234,5", None),
+    ] {
+        let found = read(&format!("a;b\n{number};2\n-{number};3\n"), decimal).unwrap();
+        assert_eq!(numbers(&found), [[1234.5, 2.0], [-1234.5, 3.0]], "{number}");
+    }
+    let grouped = read("a;b\n1.234.567;2\n1,5;3\n", Some(',')).unwrap();
+    assert_eq!(numbers(&grouped)[0][0], 1_234_567.0);
+    for number in ["12.34,5", "1'23.5", "1.2345,5"] {
+        let found = read(&format!("a;b\n{number};2\n1;3\n"), Some(',')).unwrap();
+        assert!(numbers(&found)[0][0].is_nan(), "{number}");
     }
 }

@@ -5,15 +5,15 @@ use std::f64::consts::PI;
 
 /// Units without a prefix, by what they measure and their names.
 pub const UNITS: &[(Dimension, &[&str], Unit)] = &[
-    (Dimension::Length, &["micron", "microns"], Unit::ten(-6)),
     (Dimension::Length, &["in", "inch"], Unit::times(254.0, -4)),
     (Dimension::Length, &["mil"], Unit::times(254.0, -7)),
-    (Dimension::Time, &["sec", "seconds", "hh:mm:ss", "h:mm:ss", "hh:mm", "mm:ss"], Unit::SI),
-    (Dimension::Time, &["min", "minutes"], Unit::times(60.0, 0)),
-    (Dimension::Time, &["h", "hr", "hours"], Unit::times(3600.0, 0)),
+    (Dimension::Time, &["hh:mm:ss", "h:mm:ss", "hh:mm", "mm:ss", "mdy", "dmy"], Unit::SI),
+    (Dimension::Time, &["min", "minute", "minutes", "minuten"], Unit::times(60.0, 0)),
+    (Dimension::Time, &["h", "hr", "hour", "hours", "stunden"], Unit::times(3600.0, 0)),
+    (Dimension::Time, &["d", "days"], Unit::times(86_400.0, 0)),
     (Dimension::Frequency, &["rpm", "1/min"], Unit::over(60.0)),
     (Dimension::Frequency, &["rad/s"], Unit::over(2.0 * PI)),
-    (Dimension::Frequency, &["1/s"], Unit::SI),
+    (Dimension::Frequency, &["1/s", "s-1"], Unit::SI),
     // Loads are often stated as the mass that hangs there.
     (Dimension::Force, &["gf", "g", "gram", "grams", "gram-force", "grf", "p", "pond"], GRAM_FORCE),
     (Dimension::Force, &["mgf", "mg"], Unit { ten: GRAM_FORCE.ten - 3, ..GRAM_FORCE }),
@@ -32,6 +32,9 @@ pub const UNITS: &[(Dimension, &[&str], Unit)] = &[
     (Dimension::Ratio, &["", "1", "-", "–", "—", "N/N"], Unit::SI),
     (Dimension::Ratio, &["%"], Unit::PER_CENT),
 ];
+/// Words of units, longer ones before those that they contain, each with its symbol.
+pub const WORDS: &str = "microns um micron um kilogram kg milli m micro u nano n centi c kilo k mega M newtons N newton N meters m \
+                         metres m meter m metre m hertz Hz pascal Pa seconds s second s sec s";
 const GRAM_FORCE: Unit = Unit::times(980_665.0, -8);
 
 /// Symbols of units, of quantities that no target has among them, and words that replace them.

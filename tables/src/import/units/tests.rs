@@ -77,3 +77,25 @@ fn what_is_no_number_and_no_unit_is_refused() {
     }
     assert_eq!(Unit::parse(Dimension::Force, "MN"), Some(Unit::ten(6)));
 }
+
+#[test]
+fn units_are_read_as_words_too() {
+    for (dimension, word, symbol) in [
+        (Dimension::Force, "newton", "N"),
+        (Dimension::Force, "Millinewton", "mN"),
+        (Dimension::Length, "micrometers", "um"),
+        (Dimension::Length, "micrometre", "um"),
+        (Dimension::Length, "microns", "um"),
+        (Dimension::Frequency, "kilohertz", "kHz"),
+        (Dimension::Frequency, "s-1", "1/s"),
+        (Dimension::Speed, "millimeter/second", "mm/s"),
+        (Dimension::Time, "msec", "ms"),
+        (Dimension::Time, "sec.", "s"),
+        (Dimension::Time, "Minuten", "min"),
+        (Dimension::Pressure, "kilopascal", "kPa"),
+    ] {
+        let of = |text: &str| Unit::guess(dimension, text).map(|(_, unit)| unit);
+        assert_eq!(of(word), of(symbol), "{word}");
+        assert!(of(word).is_some(), "{word}");
+    }
+}

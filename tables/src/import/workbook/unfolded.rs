@@ -1,19 +1,42 @@
-//! A packed workbook before its reader takes it: how much it unfolds to, and which cells of OpenDocument
-//! are in per cent.
+//! A packed workbook before its reader takes it: how much it unfolds to, which cells of OpenDocument are in
+//! per cent, and which rows are hidden.
+
+/// What the reader of a workbook does not say of it.
+#[derive(Default)]
+pub(super) struct Looked {
+    /// Cells of OpenDocument that are in per cent.
+    pub(super) percents: Vec<Part>,
+    /// Rows that a filter or a person hid, sheet by sheet from the first.
+    hidden: Vec<Part>,
+    /// Names and files of Excel's sheets, each behind the sheet's id.
+    sheets: Vec<(String, String)>,
+}
+
+impl Looked {
+    /// Whether a row of the sheet, counted from 0, is hidden.
+    pub(super) fn hides(&self, sheet: &str) -> impl Fn(usize) -> bool {
+        let id = self.sheets.iter().find(|(_, name)| name == sheet).map(|(id, _)| id);
+        let file = self.sheets.iter().find(|(of, file)| Some(of) == id && file != sheet);
+        let file = file.map_or(sheet, |(_, file)| file);
+        let rows: Vec<(usize, usize)> =
+            self.hidden.iter().filter(|part| part.sheet == file).map(|part| part.rows).collect();
+        move |row| rows.get(rows.partition_point(|r| r.1 <= row)).is_some_and(|r| r.0 <= row)
+    }
+}
 
 /// Looks through a packed workbook: refuses one that unfolds to far more than it is, before its reader takes
-/// memory for that, and finds the cells of OpenDocument that are in per cent.
-pub(super) fn looked_through(bytes: &[u8]) -> miette::Result<Vec<Percents>> {
+/// memory for that.
+pub(super) fn looked_through(bytes: &[u8]) -> miette::Result<Looked> {
     use std::io::Read;
     let number = |at: usize, n: usize| -> Option<usize> {
         Some(bytes.get(at..at + n)?.iter().rev().fold(0, |all, b| all << 8 | usize::from(*b)))
     };
     let mut left = 48 * bytes.len() + (16 << 20);
-    let mut percents = Vec::new();
+    let mut found = Looked::default();
     // The directory stands at the end (PKWARE, APPNOTE 4.3.12): each entry names where its data begin.
     let from = bytes.len().saturating_sub(65_557);
     let Some(end) = bytes[from..].windows(4).rposition(|w| w == b"PK\x05\x06").map(|at| from + at) else {
-        return Ok(percents);
+        return Ok(found);
     };
     let mut at = number(end + 16, 4).unwrap_or(0);
     let mut buffer = vec![0; 1 << 16];
@@ -29,7 +52,9 @@ pub(super) fn looked_through(bytes: &[u8]) -> miette::Result<Vec<Percents>> {
             let data = &data[..packed.min(data.len())];
             let mut unfolded: Box<dyn Read> =
                 if method == 8 { Box::new(flate2::read::DeflateDecoder::new(data)) } else { Box::new(data) };
-            let mut repeated = Repeats { percents, ..Repeats::default() };
+            let name = at + 46..at + 46 + number(at + 28, 2).unwrap_or(0);
+            let sheet = String::from_utf8_lossy(bytes.get(name).unwrap_or_default()).into_owned();
+            let mut repeated = Repeats { found, sheet, ..Repeats::default() };
             while let Ok(n) = unfolded.read(&mut buffer) {
                 if n == 0 {
                     break;
@@ -44,22 +69,22 @@ pub(super) fn looked_through(bytes: &[u8]) -> miette::Result<Vec<Percents>> {
                     );
                 }
             }
-            percents = repeated.percents;
+            found = repeated.found;
         }
         let lengths = [28, 30, 32].map(|k| number(at + k, 2).unwrap_or(0));
         at += 46 + lengths.iter().sum::<usize>();
     }
-    Ok(percents)
+    Ok(found)
 }
 
-/// Cells of an OpenDocument sheet that are in per cent: from and to, of rows and of columns.
-pub(super) struct Percents {
+/// Cells of a sheet: from and to, of rows and of columns. A sheet of Excel has the name of its file.
+pub(super) struct Part {
     sheet: String,
     rows: (usize, usize),
     columns: (usize, usize),
 }
 
-impl Percents {
+impl Part {
     pub(super) fn holds(&self, sheet: &str, (row, column): (usize, usize)) -> bool {
         let within = |(from, to): (usize, usize), at| from <= at && at < to;
         self.sheet == sheet && within(self.rows, row) && within(self.columns, column)
@@ -75,21 +100,21 @@ struct Repeats {
     /// behind.
     row: (usize, usize, usize),
     cells: usize,
-    /// The sheet that is open, and its rows so far with those that are open.
+    /// The file or the sheet that is open, and its rows so far with those that are open.
     sheet: String,
     rows: usize,
-    percents: Vec<Percents>,
+    found: Looked,
 }
 
 impl Repeats {
     /// Cells of the open row, which begins at row `from`: the same columns in row after row are one.
     fn put_percents(&mut self, from: usize, columns: (usize, usize)) {
-        let goes_on = |p: &&mut Percents| p.rows.1 == from && p.columns == columns && p.sheet == self.sheet;
-        match self.percents.iter_mut().rev().take(64).find(goes_on) {
+        let goes_on = |p: &&mut Part| p.rows.1 == from && p.columns == columns && p.sheet == self.sheet;
+        match self.found.percents.iter_mut().rev().take(64).find(goes_on) {
             Some(above) => above.rows.1 = self.rows,
             None => {
                 let (sheet, rows) = (self.sheet.clone(), (from, self.rows));
-                self.percents.push(Percents { sheet, rows, columns });
+                self.found.percents.push(Part { sheet, rows, columns });
             }
         }
     }
@@ -103,20 +128,39 @@ impl Repeats {
             self.rest.clear();
         }
         let text = String::from_utf8_lossy(&text);
-        for tag in text.split('<').filter(|t| t.starts_with("table:")) {
+        let marks = [("&lt;", "<"), ("&gt;", ">"), ("&quot;", "\""), ("&apos;", "'"), ("&amp;", "&")];
+        let plain = |text: &str| marks.iter().fold(text.to_string(), |n, (from, to)| n.replace(from, to));
+        let ours =
+            |tag: &&str| ["table:", "row ", "sheet ", "Relationship "].iter().any(|t| tag.starts_with(t));
+        for tag in text.split('<').filter(ours) {
             let value = |name: &str| {
                 let value = tag.split_once(name)?.1.split_once('"')?.1;
                 value.split('"').next()
             };
             let times = |name: &str| value(name)?.parse::<usize>().ok();
             if tag.starts_with("table:table ") {
-                let name = value("table:name").unwrap_or_default();
-                let marks = [("&lt;", "<"), ("&gt;", ">"), ("&quot;", "\""), ("&apos;", "'"), ("&amp;", "&")];
-                self.sheet = marks.iter().fold(name.to_string(), |n, (from, to)| n.replace(from, to));
+                self.sheet = plain(value("table:name").unwrap_or_default());
                 self.rows = 0;
+            } else if let Some(row) = tag.strip_prefix("row ").and_then(|_| times(" r=")) {
+                if value(" hidden=").is_some_and(|hidden| hidden == "1" || hidden == "true") {
+                    let sheet = self.sheet.rsplit('/').next().unwrap_or_default().to_string();
+                    let (rows, columns) = ((row.saturating_sub(1), row), (0, usize::MAX));
+                    self.found.hidden.push(Part { sheet, rows, columns });
+                }
+            } else if self.sheet == "xl/workbook.xml" {
+                let id = value(":id=").map(plain).zip(value(" name=").map(plain));
+                self.found.sheets.extend(id);
+            } else if self.sheet == "xl/_rels/workbook.xml.rels" {
+                let file = value(" Target=").and_then(|target| target.rsplit('/').next());
+                self.found.sheets.extend(value(" Id=").map(plain).zip(file.map(plain)));
             } else if tag.starts_with("table:table-row") {
                 let count = times("number-rows-repeated").unwrap_or(1);
+                let from = self.rows;
                 (self.row, self.rows) = ((count, 0, 0), self.rows.saturating_add(count));
+                if value("table:visibility").is_some_and(|v| v == "filter" || v == "collapse") {
+                    let (sheet, rows, columns) = (self.sheet.clone(), (from, self.rows), (0, usize::MAX));
+                    self.found.hidden.push(Part { sheet, rows, columns });
+                }
             } else if tag.starts_with("table:covered-table-cell") || tag.starts_with("table:table-cell") {
                 let count = times("number-columns-repeated").unwrap_or(1);
                 let (rows, filled, empty) = self.row;
