@@ -130,6 +130,37 @@ fn a_trip_is_told_with_its_unit_and_its_remedy() {
     assert!(report.contains(remedy) && report.contains(" N (limit 0.25 N)"), "{report}");
 }
 
+/// A reversed lateral sensor: a run that compared nothing, a verdict of a tilted plate, a panic.
+#[test]
+fn a_lateral_sensor_that_is_reversed_is_named() {
+    let folder = tempfile::tempdir().unwrap();
+    let plan = short_plan(folder.path());
+    let call = |arguments: &[&str]| {
+        let output = muprime().args(arguments).current_dir(folder.path()).output().unwrap();
+        (output.status.code(), texts(&output).0 + &texts(&output).1)
+    };
+    for factor in ["-1.0", "-2.0"] {
+        let defects = format!("[[defect]]\nname = \"lateral_gain\"\nparameters = {{ factor = {factor} }}\n");
+        std::fs::write(folder.path().join("d.toml"), defects).unwrap();
+        let setup =
+            ["--setup", "virtual-ideal", "--defects", "d.toml", "--out", factor.trim_start_matches('-')];
+        let told = call(&[&["run", &plan, "--fast"][..], &setup].concat());
+        assert!(told.1.contains("the lateral axis is reversed"), "{told:?}");
+    }
+    for arguments in [
+        &["diagnose", "2.0"][..],
+        &["diagnose", "1.0"],
+        &["compare", "1.0", "2.0"],
+        &["check", "1.0/points.csv"],
+    ] {
+        let (status, told) = call(arguments);
+        let told = told.replace("\n  \u{2502} ", " ");
+        assert!(status == Some(2) && told.contains("axis is reversed"), "{arguments:?}: {told}");
+    }
+    let (_, told) = call(&["check", "1.0"]);
+    assert!(told.contains("axis is reversed"), "{told}");
+}
+
 #[test]
 fn bad_input_is_refused_with_its_place_and_nothing_is_touched() {
     let folder = tempfile::tempdir().unwrap();

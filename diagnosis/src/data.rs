@@ -23,6 +23,9 @@ pub enum DataError {
          Give signed forces (along the plate's axis, not magnitudes)"
     )]
     Unsigned,
+    /// Friction that pushes along the sliding.
+    #[error("{}", models::pass::REVERSED)]
+    Reversed,
     /// A point number that stands twice.
     #[error("point {0} stands twice; number the points apart")]
     DoublePoint(u64),
@@ -87,7 +90,8 @@ impl Table {
     /// Takes a table of measured passes.
     ///
     /// # Errors
-    /// Fewer than 12 passes, values that no pass can have, points or readings that stand twice.
+    /// Fewer than 12 passes, values that no pass can have, forces without a sign or with the other one, points
+    /// or readings that stand twice.
     pub fn measured(passes: &[Pass]) -> Result<Self, DataError> {
         let measured: Vec<&Pass> = passes.iter().filter(|p| p.lateral_force_n.is_some()).collect();
         if measured.len() < 12 {
@@ -96,9 +100,13 @@ impl Table {
         if let Some([first, second]) = read_twice(&measured) {
             return Err(DataError::DoubleReading(first, second));
         }
+        let reversed = models::pass::is_reversed(measured.iter().copied());
         let table = Self::build(measured, None)?;
         if table.is_unsigned() {
             return Err(DataError::Unsigned);
+        }
+        if reversed {
+            return Err(DataError::Reversed);
         }
         Ok(table)
     }

@@ -22,9 +22,15 @@ impl Covariance {
         for i in 0..gram.nrows() {
             gram[(i, i)] += 1.0;
         }
-        let inner = Cholesky::new(gram).expect("identity plus a Gram matrix is positive definite");
+        // Numbers that overflow make no matrix: such a hypothesis is infinitely unlikely.
+        let columns = gram.nrows();
+        let (inner, finite) = Cholesky::new(gram).map_or_else(
+            || (Cholesky::pack_dirty(DMatrix::identity(columns, columns)), f64::INFINITY),
+            |inner| (inner, 0.0),
+        );
         let log_det = variance.iter().map(|v| v.ln()).sum::<f64>()
-            + 2.0 * inner.l_dirty().diagonal().iter().map(|d| d.ln()).sum::<f64>();
+            + 2.0 * inner.l_dirty().diagonal().iter().map(|d| d.ln()).sum::<f64>()
+            + finite;
         Self { inverse_sd, whitened, inner, log_det }
     }
 
@@ -154,4 +160,19 @@ pub fn log_sum_exp(values: &[f64]) -> f64 {
         return top;
     }
     top + values.iter().map(|v| (v - top).exp()).sum::<f64>().ln()
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// Numbers that overflow ended the program in a panic.
+    #[test]
+    fn a_covariance_that_overflows_is_infinitely_unlikely() {
+        for huge in [1e200, f64::INFINITY, f64::NAN] {
+            let phi = DMatrix::from_row_slice(2, 1, &[huge, 1.0]);
+            let covariance = Covariance::new(&[1e-12, 1.0], &phi);
+            assert_eq!(covariance.log_det(), f64::INFINITY, "{huge}");
+        }
+    }
 }

@@ -67,7 +67,7 @@ pub fn of_table(fitted: &Fitted, table: &Table, decision: &Decision) -> Vec<Stri
             "No effect of the library could be tried on this table: `not_testable` says what is missing.";
         remarks.push(text.into());
     }
-    if table.still_coefficient().is_none() {
+    if table.passes.iter().all(|pass| pass.amplitude > PeakToPeak::ZERO) {
         remarks.push("No pass has the plate still: mu0 is unknown and was fitted; add w = 0 passes.".into());
     }
     if fitted.pure.variance_ratio.is_none() {

@@ -101,6 +101,21 @@ impl Pass {
     }
 }
 
+/// What to do about a lateral axis that points the other way.
+pub const REVERSED: &str = "friction pushes along the sliding in the passes without vibration: the lateral axis is reversed. Set \
+    `gain = -1` for `lateral` in [[force]] of the setup, or turn the sensor; in a table turn the signs of lateral_force_n";
+/// Share of passes from which on the sign of friction is that of the axis, not of the scatter.
+const OF_ONE_SIGN: f64 = 0.95;
+
+/// Whether the lateral force points along the sliding in the passes without vibration; without any, in all.
+pub fn is_reversed<'a>(passes: impl Iterator<Item = &'a Pass> + Clone) -> bool {
+    let any_still = passes.clone().any(|p| p.amplitude == PeakToPeak::ZERO);
+    let judged = passes.filter(|p| !any_still || p.amplitude == PeakToPeak::ZERO);
+    let frictions: Vec<f64> = judged.filter_map(Pass::friction_force_n).collect();
+    let against = frictions.iter().filter(|f| **f < 0.0).count();
+    against > 0 && against as f64 >= OF_ONE_SIGN * frictions.len() as f64
+}
+
 /// `mu_0 = sum(direction L F) / sum(F^2)` over the passes without vibration; `None` without such passes.
 pub fn coulomb_coefficient(passes: &[Pass]) -> Option<f64> {
     let still = passes.iter().filter(|p| p.amplitude == PeakToPeak::ZERO);

@@ -4,6 +4,7 @@ use super::human::quantity;
 use crate::sequence::MeasuredPass;
 use crate::session::Summary;
 use calibration::certificate::date;
+use models::pass::{REVERSED, is_reversed};
 use models::quantity::PeakToPeak;
 use models::rig_file::RigFile;
 use serde::Serialize;
@@ -39,7 +40,9 @@ pub fn remarks(passes: &[MeasuredPass]) -> Vec<String> {
     let refers = |p: &MeasuredPass| p.pass.amplitude == PeakToPeak::ZERO && p.pass.lateral_force_n.is_some();
     let measured = passes.iter().any(|p| p.comparison.is_some_and(|c| c.mu_relative.is_some()));
     let rests = measured && !passes.iter().any(refers);
-    rests.then(|| NO_REFERENCE.to_string()).into_iter().chain(load_missed(passes)).collect()
+    let reversed = is_reversed(passes.iter().map(|p| &p.pass));
+    let all = [(rests, NO_REFERENCE), (reversed, REVERSED)];
+    all.into_iter().filter(|(is, _)| *is).map(|(_, words)| words.to_string()).chain(load_missed(passes)).collect()
 }
 
 /// The remark of a run whose passes all had a fifth more, or all a fifth less, than the commanded load. SR-43
