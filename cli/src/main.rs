@@ -135,6 +135,18 @@ fn say_version() -> ExitCode {
 }
 
 fn main() -> ExitCode {
+    let code = ended();
+    match runs::print::lacks() {
+        Some(why) => {
+            say!("standard output could not be written to its end: {}", cli::plain(&why.to_string()));
+            if code == ExitCode::SUCCESS { ExitCode::from(cli::FAILED) } else { code }
+        }
+        None => code,
+    }
+}
+
+/// The status with which the program ends.
+fn ended() -> ExitCode {
     // Places are named in records, catalogues and JSON, all of which are text.
     let unreadable =
         std::env::args_os().chain(std::env::var_os("MUPRIME_RUNS")).find(|a| a.to_str().is_none());
@@ -155,7 +167,7 @@ fn main() -> ExitCode {
             let message = error.render().to_string();
             match cli::plain(&message) {
                 better if better != message => say!("{}", better.trim_end()),
-                _ => drop(error.print()),
+                _ => runs::print::written(error.print()),
             }
             return ExitCode::from(if error.use_stderr() { cli::REFUSED } else { cli::DONE });
         }
@@ -239,8 +251,11 @@ fn refused(report: &miette::Report, json: bool) -> ExitCode {
     if json {
         let causes: Vec<String> = report.chain().skip(1).map(|c| cli::plain(&c.to_string())).collect();
         // Of several problems each has a help of its own.
-        let mut helps: Vec<String> =
-            tables::check::problems_of(report).into_iter().filter_map(|p| p.help).collect();
+        let mut helps: Vec<String> = tables::check::problems_of(report)
+            .into_iter()
+            .filter_map(|p| p.help)
+            .filter(|help| !help.is_empty())
+            .collect();
         helps.dedup();
         let help = (!helps.is_empty()).then(|| helps.join("; "));
         answer_json(&json!({

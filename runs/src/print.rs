@@ -4,8 +4,9 @@
 //! queues: whoever keeps a pass or switches a drive off never waits for a terminal, a pipe or a pager.
 //!
 //! A reader may go away at any time (`muprime ... | head -1`), and a run must not end with it: what cannot be
-//! written is dropped. Text may come from an instrument or a file: control characters, which could rewrite
-//! what a person sees on a terminal, are shown as `\u001b` and the like; colours and line ends stay.
+//! written is dropped. A disk that is full makes the status 1 in the end ([`lacks`]). Text may come from an
+//! instrument or a file: control characters, which could rewrite what a person sees on a terminal, are shown
+//! as `\u001b` and the like; colours and line ends stay.
 
 use std::borrow::Cow;
 use std::collections::VecDeque;
@@ -97,8 +98,8 @@ impl Piece {
 
     fn write(self, output: usize) {
         match self {
-            Piece::Text(text) if output == OUT => whole(&mut io::stdout().lock(), &text),
-            Piece::Text(text) => whole(&mut io::stderr().lock(), &text),
+            Piece::Text(text) if output == OUT => written(whole(&mut io::stdout().lock(), &text)),
+            Piece::Text(text) => drop(whole(&mut io::stderr().lock(), &text)),
             Piece::Drawn(_, drawn) => drawn(),
         }
     }
@@ -289,9 +290,24 @@ pub fn release() -> Vec<String> {
     held().take().map(Held::all).unwrap_or_default()
 }
 
-fn whole(to: &mut impl Write, text: &str) {
+fn whole(to: &mut impl Write, text: &str) -> io::Result<()> {
     // One write: lines of two threads do not mix.
-    let _ = to.write_all(clean(text).as_bytes()).and_then(|()| to.flush());
+    to.write_all(clean(text).as_bytes()).and_then(|()| to.flush())
+}
+
+/// Why standard output lacks something, first.
+static LACKS: Mutex<Option<io::Error>> = Mutex::new(None);
+
+/// Notes how a write to standard output went. A reader that has gone away lacks nothing.
+pub fn written(result: io::Result<()>) {
+    if let Some(why) = result.err().filter(|why| why.kind() != io::ErrorKind::BrokenPipe) {
+        LACKS.lock().unwrap_or_else(PoisonError::into_inner).get_or_insert(why);
+    }
+}
+
+/// Why standard output could not be written, where it could not: a full disk, say.
+pub fn lacks() -> Option<io::Error> {
+    LACKS.lock().unwrap_or_else(PoisonError::into_inner).take()
 }
 
 /// Standard error for logs: never fails, never passes control characters on.
@@ -474,6 +490,9 @@ mod tests {
                 Err(io::ErrorKind::BrokenPipe.into())
             }
         }
-        whole(&mut Gone, "nobody hears this\n");
+        written(whole(&mut Gone, "nobody hears this\n"));
+        assert!(lacks().is_none());
+        written(Err(io::ErrorKind::StorageFull.into()));
+        assert_eq!(lacks().map(|why| why.kind()), Some(io::ErrorKind::StorageFull));
     }
 }

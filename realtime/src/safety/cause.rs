@@ -195,6 +195,8 @@ impl Unit {
         let digits = (3.0 - magnitude).clamp(0.0, 9.0) as usize;
         let number = format!("{value:.digits$}");
         let number = if digits > 0 { number.trim_end_matches('0').trim_end_matches('.') } else { &number };
+        // What rounds to nothing has no sign.
+        let number = if number == "-0" { "0" } else { number };
         if symbol.is_empty() { number.into() } else { format!("{number} {symbol}") }
     }
 }

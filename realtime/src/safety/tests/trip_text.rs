@@ -72,6 +72,7 @@ fn value_and_limit_of_a_trip_have_one_unit() {
         (1e-4, 0.02, ": 0.0001 m (limit 0.02 m)"),
         (f64::INFINITY, 2e-6, ": no data (limit 2 \u{b5}m)"),
         (0.0, 0.0, ": 0 m (limit 0 m)"),
+        (-1e-14, 0.02, ": 0 m (limit 0.02 m)"),
     ] {
         let text = Trip { unit: Unit::Metre, value, bound, ..trip }.to_string();
         assert!(text.contains(words), "{text}");
