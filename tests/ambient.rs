@@ -197,11 +197,82 @@ fn a_level_that_nobody_brings_about_is_refused_with_the_remedy() {
     assert!(done.status.code() == Some(2) && said.contains("--answers") && !out.exists(), "{said}");
 }
 
+/// Passes at two pressures were one condition: half of a run differed from the whole by its pressure.
+#[test]
+fn runs_are_compared_at_the_levels_of_the_air_that_both_have() {
+    let both = run("virtual", CHAMBER, PLAN, None, None);
+    let upper = run("virtual", CHAMBER, &PLAN.replace("[101325, 50000]", "[101325]"), None, None);
+    let compared = runs::compare::Compared::of([&both.out, &upper.out]).unwrap();
+    let pairs = &compared.comparison.pairs;
+    assert!(
+        !pairs.is_empty() && pairs.iter().all(|p| p.air.ambient_pressure_pa == Some(101_325.0)),
+        "{pairs:?}"
+    );
+    assert!(compared.comparison.unpaired[0] > 0 && compared.comparison.unpaired[1] == 0);
+    assert!(pairs[0].setting().ends_with("pressure 101.325 kPa"), "{}", pairs[0].setting());
+    assert!(runs::report::comparison::page(&compared).unwrap().contains("pressure 101.325 kPa"));
+    let page = std::fs::read_to_string(both.out.join("report.html")).unwrap();
+    assert!(page.contains("<td>pressure 50") || page.contains("<td>pressure 49"), "{page}");
+    assert!(page.contains("levels of the air are in the table"));
+    // Runs that set nothing are compared as before, whatever the weather.
+    let none = PLAN.replace("ambient_pressure_pa = [101325, 50000]\n", "");
+    let [a, b] = [run("virtual", "", &none, None, None), run("virtual", "", &none, None, None)];
+    let compared = runs::compare::Compared::of([&a.out, &b.out]).unwrap();
+    assert!(compared.comparison.pairs.iter().all(|p| p.air == Default::default()));
+    assert_eq!(compared.comparison.unpaired, [0, 0]);
+}
+
+/// A refused answer gave no reason, and the next line was taken for it.
+#[test]
+fn an_answer_of_a_file_that_does_not_fit_ends_the_run_with_its_reason() {
+    let tables = "[ambient]\nby_operator = [\"ambient_pressure_pa\"]\n";
+    let plan = format!("{PLAN}[[step]]\nwhen = \"before\"\naction = \"measure_moisture\"\n");
+    let run = |answers: &str| run("virtual", tables, &plan, None, Some(answers));
+    // Units, a decimal comma and the mark that an editor of Windows puts first are no reason.
+    let ran = run("\u{feff}35,5\n101.325kPa\r\n50 kPa\n");
+    assert_eq!(ran.outcome, Outcome::Complete, "{:?}", ran.events);
+    let typed =
+        |p: &MeasuredPass| p.levels.iter().any(|l| l.quantity == "skin_moisture_au" && l.value == 35.5);
+    assert!(ran.passes.iter().all(typed));
+    for (answers, why) in [
+        ("35%\n101325\n50000\n", "not a quantity in a.u."),
+        ("-5\n101325\n50000\n", "0 to 200 a.u. is needed"),
+        ("101325\n101325\n50000\n", "0 to 200 a.u. is needed"),
+        ("35\nfifty\n50000\n", "not a quantity in Pa"),
+        ("35\nnan\n50000\n", "is needed"),
+    ] {
+        let ran = run(answers);
+        assert_eq!((&ran.outcome, ran.passes.len()), (&Outcome::Stopped, 0), "{answers}: {:?}", ran.events);
+        let refused = ran.events.iter().find_map(|e| match e {
+            Event::Answered { refused: Some(why), .. } => Some(why.clone()),
+            _ => None,
+        });
+        assert!(refused.as_ref().is_some_and(|r| r.contains(why)), "{answers}: {refused:?}");
+    }
+}
+
+/// A series that named no temperature was measured at what another one had left behind.
+#[test]
+fn a_series_names_every_quantity_of_the_air_that_another_sets() {
+    let plan = format!("{PLAN}[[series]]\namplitude_pp_m = [2e-6]\ntemperature_c = [30]\n");
+    let out = tempfile::tempdir().unwrap();
+    let refused = job(Setup::load("virtual").unwrap(), &plan, out.path()).points().unwrap_err();
+    let told = format!("{refused:?}");
+    for words in
+        ["leaves temperature_c at what", "leaves ambient_pressure_pa at what", "add temperature_c = [VALUE]"]
+    {
+        assert!(told.replace("\n", " ").contains(words) || told.contains(words), "{words}: {told}");
+    }
+    // One that leaves all as it is comes before anything is set.
+    let plan = format!("{PLAN}[[series]]\namplitude_pp_m = [2e-6]\n");
+    job(Setup::load("virtual").unwrap(), &plan, out.path()).points().unwrap();
+}
+
 /// The operator pumps and types what the gauge shows; a slip of the pen is asked again, and the record has all of it.
 #[test]
 fn the_operator_is_asked_and_what_he_types_is_what_the_table_holds() {
     let by_hand = "[ambient]\nby_operator = [\"ambient_pressure_pa\"]\n";
-    let ran = run("virtual", by_hand, PLAN, None, Some("# morning\n101200\nfifty\n5000\n50300\n"));
+    let ran = run("virtual", by_hand, PLAN, None, Some("# morning\n101200\n5000\n50300\n"));
     assert_eq!(ran.outcome, Outcome::Complete, "{:?}", ran.events);
     let found: Vec<f64> = ran.passes.iter().map(|p| p.pass.ambient_pressure_pa.unwrap()).collect();
     assert!(found.iter().all(|pa| [101_200.0, 50_300.0].contains(pa)), "{found:?}");
@@ -214,8 +285,8 @@ fn the_operator_is_asked_and_what_he_types_is_what_the_table_holds() {
     let last = pressure(ran.passes.last().unwrap());
     assert!(last.age_s > 2.0, "it grows old: {last:?}");
     let count = |which: fn(&Event) -> bool| ran.events.iter().filter(|e| which(e)).count();
-    assert_eq!(count(|e| matches!(e, Event::OperatorStep { .. })), 4, "{:?}", ran.events);
-    assert_eq!(count(|e| matches!(e, Event::Answered { .. })), 4);
+    assert_eq!(count(|e| matches!(e, Event::OperatorStep { .. })), 3, "{:?}", ran.events);
+    assert_eq!(count(|e| matches!(e, Event::Answered { .. })), 3);
     assert_eq!((count(|e| matches!(e, Event::Disarmed { .. })), count(|e| *e == Event::Armed)), (2, 3));
     // Nobody to answer any more: the run stops, and says so.
     let short = run("virtual", by_hand, PLAN, None, Some("101200\n"));

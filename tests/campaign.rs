@@ -25,10 +25,9 @@ fn ideal(seed: u64, blocks: u32) -> Campaign {
 /// Its answers on a virtual rig with these defects.
 fn answers(campaign: &Campaign, defects: &str) -> Vec<Claim> {
     let folder = tempfile::tempdir().unwrap();
-    campaign.open(folder.path()).unwrap();
-    for session in campaign::sessions(&campaign.file) {
+    let job = |session: campaign::Session| {
         let setup = campaign.setups[session.cell].clone();
-        let job = Job {
+        Job {
             model: Arc::new(SpringSlider::new(setup.tip.finger).unwrap()),
             setup,
             plan: campaign.plan.clone(),
@@ -39,8 +38,12 @@ fn answers(campaign: &Campaign, defects: &str) -> Vec<Claim> {
             fast: true,
             notes: Default::default(),
             answers: None,
-        };
-        job.run_in_virtual_time(&Signals::default(), &mut |_| {}).unwrap();
+        }
+    };
+    let sessions = campaign::sessions(&campaign.file);
+    campaign.open(folder.path(), &job(sessions[0].clone()).identity()).unwrap();
+    for session in sessions {
+        job(session).run_in_virtual_time(&Signals::default(), &mut |_| {}).unwrap();
     }
     let (file, made) = studies::campaign::measured(folder.path()).unwrap();
     assert_eq!(made.len(), campaign::sessions(&file).len());

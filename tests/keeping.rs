@@ -359,8 +359,143 @@ fn another_sample_or_operator_does_not_take_over_a_run() {
         assert_eq!(refused.status.code(), Some(2), "{said}");
         assert!(said.contains(other) && said.contains(was) && said.contains("--out"), "{said}");
     }
-    assert_eq!(with(&["--sample", "tip 3"]).status.code(), Some(0));
+    // Whose exposure was counted for the operator has no other subject afterwards.
+    for (words, was) in [(["--subject", "P7"], "Ada"), (["--operator", "Bob"], "Ada")] {
+        assert!(texts(&with(&words)).1.contains(&format!("'{was}'")), "{words:?}");
+    }
+    assert_eq!(with(&["--sample", "tip 3", "--subject", "Ada"]).status.code(), Some(0));
     assert_eq!(std::fs::read(out.join("run.toml")).unwrap(), before);
+    // What was not stated of its passes is not stated afterwards.
+    let unnamed = folder.path().join("unnamed");
+    assert_eq!(sweep(&plan, &unnamed).arg("--fast").status().unwrap().code(), Some(0));
+    let refused = sweep(&plan, &unnamed).args(["--fast", "--operator", "Bob"]).output().unwrap();
+    assert!(
+        refused.status.code() == Some(2) && texts(&refused).1.contains("--operator away"),
+        "{}",
+        texts(&refused).1
+    );
+}
+
+/// Another tip, target or set of defects took up a run, and it was stated as one.
+#[test]
+fn a_run_is_not_taken_up_with_another_tip_target_or_set_of_defects() {
+    let folder = tempfile::tempdir().unwrap();
+    let at = |name: &str| folder.path().join(name);
+    let ideal = tests::setup("virtual-ideal").text;
+    std::fs::write(at("setup.toml"), ideal.replacen("\"artificial-silicone\"", "\"tip.toml\"", 1)).unwrap();
+    std::fs::write(at("tip.toml"), runs::fingertip::BUNDLED[0].1).unwrap();
+    let target = "[render]\ntarget = \"table\"\nfile = \"target.csv\"\n[[series]]\nname = \"r\"\n";
+    let text =
+        tests::SHORT.split("[[series]]").next().unwrap().replace("measure_s = 0.1", "measure_m = 0.01");
+    std::fs::write(at("plan.toml"), text + target).unwrap();
+    std::fs::write(at("target.csv"), "x_m,mu_relative\n-0.02,0.8\n0.02,0.9\n").unwrap();
+    std::fs::write(at("defects.toml"), "[[defect]]\nname = \"plate_tilt\"\nseed = 1\n").unwrap();
+    let run = || {
+        let mut command = muprime();
+        command.current_dir(folder.path()).args(["run", "plan.toml", "--fast", "--setup", "setup.toml"]);
+        let output = command.args(["--defects", "defects.toml", "--out", "run"]).output().unwrap();
+        (output.status.code(), texts(&output).1)
+    };
+    let (status, told) = run();
+    assert_eq!(status, Some(0), "{told}");
+    let before = std::fs::read(at("run/rig.toml")).unwrap();
+    for (file, from, to, what) in [
+        ("tip.toml", "3.9e6", "2.9e6", "another setup"),
+        ("target.csv", "0.8", "0.7", "another plan"),
+        ("defects.toml", "seed = 1", "seed = 2", "another set of defects"),
+    ] {
+        let was = std::fs::read_to_string(at(file)).unwrap();
+        std::fs::write(at(file), was.replacen(from, to, 1)).unwrap();
+        let (status, told) = run();
+        assert!(status == Some(2) && told.contains(what), "{file}: {status:?} {told}");
+        std::fs::write(at(file), was).unwrap();
+    }
+    assert_eq!(std::fs::read(at("run/rig.toml")).unwrap(), before);
+    let (status, told) = run();
+    assert!(status == Some(0) && told.contains("already complete"), "{told}");
+}
+
+/// Two runs that began in one second shared a folder: the second measured nothing, and ended well. The name
+/// of a plan led out of the folder of runs.
+#[test]
+fn runs_without_a_folder_of_their_own_get_one_each() {
+    let folder = tempfile::tempdir().unwrap();
+    let plan = folder.path().join("plan.toml");
+    std::fs::write(&plan, served::plan("w/f ../x", 0, &[2e-6])).unwrap();
+    let run = |arguments: &[&str]| {
+        let mut command = muprime();
+        command.args(["--json", "run", "--fast", "--setup", "virtual-ideal"]).arg(&plan).args(arguments);
+        command.env("MUPRIME_RUNS", folder.path().join("runs")).current_dir(folder.path()).output().unwrap()
+    };
+    // A refusal leaves nothing behind.
+    assert_eq!(run(&["--model", "none"]).status.code(), Some(2));
+    assert!(!folder.path().join("runs").exists());
+    let mut taken = BTreeSet::new();
+    for _ in 0..3 {
+        let output = run(&[]);
+        let last = documents(&output).pop().unwrap();
+        assert_eq!(last["summary"]["finished_before"], false, "{last}");
+        let made = PathBuf::from(last["summary"]["folder"].as_str().unwrap());
+        assert_eq!(made.parent(), Some(&*folder.path().join("runs")), "{made:?}");
+        assert!(taken.insert(made));
+    }
+}
+
+/// `recover` replaced the record of a living run under its writer: the sweep stopped.
+#[test]
+fn the_record_of_a_living_run_is_left_alone_and_is_not_called_cut() {
+    let folder = tempfile::tempdir().unwrap();
+    let (plan, out) = (plan(folder.path(), 1), folder.path().join("run"));
+    assert_eq!(sweep(&plan, &out).arg("--fast").status().unwrap().code(), Some(0));
+    // As the folder of a run that is still going.
+    let (record, lock) = (out.join("run-1.mcap"), runs::run_dir::claim(&out.join(".lock")).unwrap());
+    let whole = std::fs::read(&record).unwrap();
+    std::fs::write(&record, &whole[..whole.len() - 100]).unwrap();
+    std::fs::remove_file(out.join("summary.json")).unwrap();
+    let call = |verb: &str, on: &Path| {
+        let output = muprime().arg(verb).arg(on).output().unwrap();
+        (output.status.code(), texts(&output).0 + &texts(&output).1)
+    };
+    let (status, told) = call("recover", &record);
+    assert!(status == Some(2) && told.contains("live"), "{told}");
+    assert_eq!(std::fs::read(&record).unwrap().len(), whole.len() - 100);
+    let (_, told) = call("report", &out);
+    let page = std::fs::read_to_string(out.join("report.html")).unwrap();
+    assert!(!told.contains("cut") && !page.contains("the record is cut"), "{told}");
+    drop(lock);
+    let (_, told) = call("report", &out);
+    assert!(told.contains("the record is cut"), "{told}");
+    // A run that was killed and mended could never pass its check again.
+    assert_eq!(call("check", &out).0, Some(2));
+    assert_eq!(call("recover", &record).0, Some(0));
+    let (status, told) = call("check", &out);
+    assert!(status == Some(0) && told.contains("was made whole by"), "{told}");
+}
+
+/// A full disk behind standard output cut it, and the status was 0.
+#[test]
+fn standard_output_that_cannot_be_written_ends_with_1() {
+    let folder = tempfile::tempdir().unwrap();
+    let (plan, out) = (plan(folder.path(), 1), folder.path().join("run"));
+    let (plan, out) = (plan.to_str().unwrap(), out.to_str().unwrap());
+    let full = |arguments: &[&str]| {
+        let full = std::fs::OpenOptions::new().write(true).open("/dev/full").unwrap();
+        let output = muprime().args(arguments).stdout(full).output().unwrap();
+        (output.status.code(), texts(&output).1)
+    };
+    for arguments in [
+        &["--help"][..],
+        &["--version"],
+        &["schema", "plan"],
+        &["--json", "run", plan, "--fast", "--setup", "virtual-ideal", "--out", out],
+    ] {
+        let (status, told) = full(arguments);
+        assert!(
+            status == Some(1) && told.contains("standard output could not be written"),
+            "{arguments:?}: {told}"
+        );
+    }
+    assert_eq!(full(&["--json", "check", "/dev/null/nothing"]).0, Some(2));
 }
 
 /// A name that belongs to another file, or to another output: refused before any work, and nothing is

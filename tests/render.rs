@@ -233,6 +233,30 @@ fn a_table_is_a_target_in_either_unit_and_a_row_of_an_image_is_one() {
 
 /// Gratings of 0.5 to 10 mm at 5 to 100 mm/s, open loop beside feedback: `MUPRIME_LONG=1` prints the whole
 /// table.
+/// Millimetres under the header x_m were taken for metres: a target of which nothing was felt.
+#[test]
+fn a_target_that_is_a_thousand_times_too_long_is_refused_and_one_pass_has_no_scatter() {
+    let folder = tempfile::tempdir().unwrap();
+    let of = |rows: &str, out: &str| {
+        std::fs::write(folder.path().join("t.csv"), format!("x_m,mu_relative\n{rows}")).unwrap();
+        let mut job = job(&folder.path().join(out), "target = \"table\"\nfile = \"t.csv\"", "name = \"t\"");
+        job.plan.origin = folder.path().join("plan.toml").display().to_string();
+        job
+    };
+    let long = of("-50,0.8\n0,0.9\n50,0.8\n", "never").points().unwrap_err();
+    assert!(
+        long.to_string().contains("100 m long") && long.help().unwrap().to_string().contains("x_m in m"),
+        "{long}"
+    );
+    // One pass each way: a shift, and no scatter of it.
+    let job = of("-0.05,0.7\n0,0.9\n0.05,0.7\n", "bump");
+    let out = job.out.clone();
+    job.run_in_virtual_time(&Signals::default(), &mut |_| {}).unwrap();
+    let group = &read(&out).unwrap().groups[0];
+    assert_eq!((group.passes, group.shift_sd_m), (2, None));
+    assert!(group.shift_m.iter().all(Option::is_some), "{:?}", group.shift_m);
+}
+
 #[test]
 fn gratings_by_period_and_speed_open_loop_and_with_feedback() {
     let periods = tests::rounds(vec![5.0], vec![0.5, 1.0, 2.0, 5.0, 10.0]);

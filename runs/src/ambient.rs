@@ -12,7 +12,7 @@ use crate::input::{Problems, unit_meant, unit_of};
 use crate::plan::{Plan, series_place};
 use crate::sequence::MeasuredPass;
 use crate::setup::{Setup, SetupFile};
-use models::condition::Condition;
+use models::condition::{Ambient, Condition};
 use models::covariate::{self, Covariate};
 use realtime::ports::Nanos;
 use serde::{Deserialize, Serialize};
@@ -33,6 +33,25 @@ pub fn shown(at: usize, value: f64) -> String {
 
 /// Something for each quantity of [`AIR`].
 pub type OfAir<T> = [T; 3];
+
+/// The values of the air, in the order of [`AIR`].
+pub const fn values(air: &Ambient) -> OfAir<Option<f64>> {
+    [air.ambient_pressure_pa, air.temperature_c, air.relative_humidity_pct]
+}
+
+/// What is known of the air, each quantity in words.
+pub fn air_words(air: &Ambient) -> impl Iterator<Item = String> {
+    values(air).into_iter().enumerate().filter_map(|(at, value)| value.map(|value| shown(at, value)))
+}
+
+impl MeasuredPass {
+    /// The levels of the air that its plan states.
+    pub fn levels_set(&self) -> Ambient {
+        let planned = |c: &Covariate| self.levels.iter().find(|level| level.quantity == c.name)?.planned;
+        let [ambient_pressure_pa, temperature_c, relative_humidity_pct] = AIR.map(|(c, _)| planned(c));
+        Ambient { ambient_pressure_pa, temperature_c, relative_humidity_pct }
+    }
+}
 
 /// Where a value comes from.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
@@ -288,10 +307,25 @@ impl SetupFile {
 impl Plan {
     /// Which quantities of the air the plan sets in any of its series.
     pub fn sets_air(&self) -> OfAir<bool> {
-        AIR.map(|(covariate, _)| {
-            let listed = self.file.series.iter().flat_map(|series| series.lists());
-            listed.into_iter().any(|(c, list)| c.name == covariate.name && !list.is_empty())
-        })
+        std::array::from_fn(|at| self.file.series.iter().any(|series| !series.air()[at].1.is_empty()))
+    }
+
+    /// Refuses a series that sets one quantity of the air and leaves another to what was left behind.
+    pub(crate) fn check_left_behind(&self, wrong: &mut Problems<'_>) {
+        for (index, series) in self.file.series.iter().enumerate() {
+            let Some((set, _)) = series.air().into_iter().find(|(_, list)| !list.is_empty()) else {
+                continue;
+            };
+            for ((covariate, list), sets) in series.air().into_iter().zip(self.sets_air()) {
+                if sets && list.is_empty() {
+                    let (set, name) = (set.name, covariate.name);
+                    let problem =
+                        format!("the series sets {set} and leaves {name} at what another series sets");
+                    let place = series_place(&self.text, index, set);
+                    wrong.add_at(place, problem, format!("add {name} = [VALUE] to this series"));
+                }
+            }
+        }
     }
 
     /// Refuses levels that nobody brings about on a setup: they would be written and not be there.
@@ -302,8 +336,7 @@ impl Plan {
         let mut wrong = Problems::of(&self.origin, &self.text);
         let means = setup.file.means();
         for (index, series) in self.file.series.iter().enumerate() {
-            for (covariate, list) in series.lists() {
-                let Some(at) = AIR.iter().position(|(c, _)| c.name == covariate.name) else { continue };
+            for (at, (covariate, list)) in series.air().into_iter().enumerate() {
                 if list.is_empty() || means[at].is_some() {
                     continue;
                 }

@@ -12,6 +12,7 @@ mod origin;
 
 use crate::input::{self, Problems};
 use crate::plan::Plan;
+use crate::run_dir::Identity;
 use crate::setup::Setup;
 use miette::IntoDiagnostic;
 use rand::SeedableRng;
@@ -181,12 +182,12 @@ impl Campaign {
         Ok(Campaign { file, text: text.to_string(), plan, setups, folder: folder.to_path_buf() })
     }
 
-    /// Makes the campaign's folder, or takes up that of the same campaign.
+    /// Makes the campaign's folder, or takes up that of the same campaign, for sessions as `now`.
     ///
     /// # Errors
-    /// A folder of another campaign; a plan, setup or tip that was changed after a session was made with
-    /// it, or one that cannot be written.
-    pub fn open(&self, folder: &Path) -> miette::Result<()> {
+    /// A folder of another campaign, or one that cannot be written; a plan, setup, model or defects that were
+    /// changed after a session was made.
+    pub fn open(&self, folder: &Path, now: &Identity) -> miette::Result<()> {
         let stored = folder.join(FILE);
         if stored.exists() {
             miette::ensure!(
@@ -195,7 +196,7 @@ impl Campaign {
                 "{} holds another campaign than this one",
                 folder.display()
             );
-            return self.unchanged(folder);
+            return self.unchanged(folder, now);
         }
         crate::files::make_folder(&folder.join("sessions"))?;
         self.store_origin(folder)?;

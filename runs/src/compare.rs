@@ -4,10 +4,13 @@
 //! them in proportion. Differences therefore carry a full covariance, the scatter of passes on its diagonal and a term of rank one
 //! for the references of both runs. Calibration that both runs share (gains, stiffnesses) cancels in a difference and is left out.
 
+use crate::ambient::{OfAir, Tolerances, air_words, values};
 use crate::report::RunData;
 use crate::report::human::{p_value, quantity};
 use crate::report::levels;
-use models::pass::Pass;
+use crate::sequence::MeasuredPass;
+use models::condition::Ambient;
+use models::pass::{Pass, REVERSED, coulomb_coefficient};
 use models::quantity::PeakToPeak;
 use models::rig_file::PassNoise;
 use realtime::compare::VISIBLE_DEPARTURE;
@@ -38,9 +41,11 @@ pub struct Reference {
 
 /// One side of a comparison.
 #[derive(Clone, Debug)]
-pub struct Side<'a> {
-    /// The passes.
-    pub passes: Vec<&'a Pass>,
+pub struct Side {
+    /// The passes, each at the level of the air that its plan states.
+    pub passes: Vec<Pass>,
+    /// Quantities of the air that its plan sets.
+    pub sets: OfAir<bool>,
     /// How passes of that rig repeat.
     pub noise: PassNoise,
 }
@@ -69,6 +74,9 @@ pub struct Paired {
     pub direction: i8,
     /// Normal force in N.
     pub normal_force_n: f64,
+    /// The levels of the air that a plan sets.
+    #[serde(flatten)]
+    pub air: Ambient,
     /// The first run.
     pub a: Mean,
     /// The second run.
@@ -84,7 +92,12 @@ impl Paired {
     pub fn setting(&self) -> String {
         let speed = self.speed_m_s * f64::from(self.direction);
         let [w, f] = [quantity(self.amplitude_pp_m, "m"), quantity(self.frequency_hz, "Hz")];
-        [w, f, quantity(speed, "m/s"), quantity(self.normal_force_n, "N")].join(", ")
+        let load = quantity(self.normal_force_n, "N");
+        [w, f, quantity(speed, "m/s"), load]
+            .into_iter()
+            .chain(air_words(&self.air))
+            .collect::<Vec<_>>()
+            .join(", ")
     }
 
     /// The difference in standard deviations.
@@ -211,28 +224,37 @@ pub struct Comparison {
     pub judged: Option<Judged>,
 }
 
-impl<'a> Side<'a> {
+impl Side {
     /// The passes of a run.
-    pub fn of(run: &'a RunData, noise: PassNoise) -> Self {
-        Side { passes: run.passes.iter().map(|p| &p.pass).collect(), noise }
+    pub fn of(run: &RunData, noise: PassNoise) -> Self {
+        let mut sets = OfAir::default();
+        let at_level = |p: &MeasuredPass| {
+            let set = values(&p.levels_set());
+            sets = std::array::from_fn(|at| sets[at] || set[at].is_some());
+            let mut pass = p.pass.clone();
+            let found =
+                [&mut pass.ambient_pressure_pa, &mut pass.temperature_c, &mut pass.relative_humidity_pct];
+            found.into_iter().zip(set).for_each(|(found, set)| *found = set.or(*found));
+            pass
+        };
+        let passes = run.passes.iter().map(at_level).collect();
+        Side { passes, sets, noise }
     }
 
-    /// `mu_0` by least squares over the passes without vibration; `None` where there is none.
-    pub fn reference(&self) -> Option<Reference> {
-        let (mut top, mut bottom, mut rows) = (0.0, 0.0, Vec::new());
-        for pass in self.passes.iter().filter(|p| p.amplitude == PeakToPeak::ZERO) {
-            let Some(friction) = pass.friction_force_n() else { continue };
-            top += friction * pass.normal_force_n;
-            bottom += pass.normal_force_n.powi(2);
-            rows.push(pass.normal_force_n);
+    /// `mu_0` by least squares over the passes without vibration; an error says why there is none.
+    pub fn reference(&self) -> Result<Reference, &'static str> {
+        let none = "the run has no pass without vibration, and mu' is friction over that of such passes";
+        let mu0 = coulomb_coefficient(&self.passes).ok_or(none)?;
+        if mu0.is_nan() || mu0 <= 0.0 {
+            return Err(REVERSED);
         }
-        let mu0 = top / bottom;
-        if !(mu0.is_finite() && mu0 > 0.0) {
-            return None;
-        }
-        let variance: f64 =
-            rows.iter().map(|n| (n * n / bottom).powi(2) * self.relative_variance(1.0, mu0, *n)).sum();
-        Some(Reference { mu0, relative_sd: variance.sqrt() })
+        let still =
+            self.passes.iter().filter(|p| p.amplitude == PeakToPeak::ZERO && p.lateral_force_n.is_some());
+        let loads: Vec<f64> = still.map(|p| p.normal_force_n).collect();
+        let squares: f64 = loads.iter().map(|n| n * n).sum();
+        let of = |n: &f64| (n * n / squares).powi(2) * self.relative_variance(1.0, mu0, *n);
+        let variance: f64 = loads.iter().map(of).sum();
+        Ok(Reference { mu0, relative_sd: variance.sqrt() })
     }
 
     /// Variance of one pass's `mu'` from pass to pass, at `mu_relative`.
@@ -243,8 +265,8 @@ impl<'a> Side<'a> {
             + (self.noise.pass_relative_sd * mu_relative).powi(2)
     }
 
-    fn vibrating(&self) -> impl Iterator<Item = &'a Pass> + '_ {
-        self.passes.iter().copied().filter(|p| {
+    fn vibrating(&self) -> impl Iterator<Item = &Pass> {
+        self.passes.iter().filter(|p| {
             p.amplitude > PeakToPeak::ZERO && p.normal_force_n > 0.0 && p.lateral_force_n.is_some()
         })
     }
@@ -262,17 +284,40 @@ fn settings(p: &Pass) -> [f64; 4] {
     [p.amplitude.metres(), p.frequency_hz, p.speed_m_s, p.normal_force_n]
 }
 
-fn same(a: &Pass, b: &Pass) -> bool {
+/// Quantities of the air that the plan of any of these runs sets: their levels are part of a condition.
+fn set_by(sides: &[&Side]) -> OfAir<bool> {
+    std::array::from_fn(|at| sides.iter().any(|side| side.sets[at]))
+}
+
+/// The levels of a pass in these quantities.
+fn air_of(p: &Pass, set: &OfAir<bool>) -> Ambient {
+    let of = |at: usize, found: Option<f64>| found.filter(|_| set[at]);
+    Ambient {
+        ambient_pressure_pa: of(0, p.ambient_pressure_pa),
+        temperature_c: of(1, p.temperature_c),
+        relative_humidity_pct: of(2, p.relative_humidity_pct),
+    }
+}
+
+fn same(a: &Pass, b: &Pass, set: &OfAir<bool>) -> bool {
     let near = |((x, y), within): ((f64, f64), f64)| (x - y).abs() <= within * x.abs().max(y.abs());
-    a.direction == b.direction && settings(a).into_iter().zip(settings(b)).zip(SAME).all(near)
+    let airs = [a, b].map(|p| values(&air_of(p, set)));
+    let level = |at: usize| match [airs[0][at], airs[1][at]] {
+        [Some(x), Some(y)] => (x - y).abs() <= Tolerances::default().of_air()[at],
+        [x, y] => x == y,
+    };
+    a.direction == b.direction
+        && settings(a).into_iter().zip(settings(b)).zip(SAME).all(near)
+        && (0..airs[0].len()).all(level)
 }
 
 /// The passes with vibration of some runs by their condition: its first pass, and the passes of each run.
-fn by_condition<'a>(sides: &[&Side<'a>]) -> Vec<(&'a Pass, Vec<Vec<&'a Pass>>)> {
+fn by_condition<'a>(sides: &[&'a Side]) -> Vec<(&'a Pass, Vec<Vec<&'a Pass>>)> {
+    let set = set_by(sides);
     let mut found: Vec<(&Pass, Vec<Vec<&Pass>>)> = Vec::new();
     for (i, side) in sides.iter().enumerate() {
         for pass in side.vibrating() {
-            let at = found.iter().position(|(first, _)| same(first, pass)).unwrap_or_else(|| {
+            let at = found.iter().position(|(first, _)| same(first, pass, &set)).unwrap_or_else(|| {
                 found.push((pass, vec![Vec::new(); sides.len()]));
                 found.len() - 1
             });
@@ -282,11 +327,12 @@ fn by_condition<'a>(sides: &[&Side<'a>]) -> Vec<(&'a Pass, Vec<Vec<&'a Pass>>)> 
     found
 }
 
-/// Pairs the passes of two runs and judges their differences; `None` where a run has no pass without vibration.
-pub fn compare(a: &Side<'_>, b: &Side<'_>) -> Option<Comparison> {
-    let references = [a.reference()?, b.reference()?];
+/// Pairs the passes of two runs and judges their differences, over the `mu_0` of each.
+pub fn compare(sides: [&Side; 2], references: [Reference; 2]) -> Comparison {
+    let [a, b] = sides;
+    let set = set_by(&sides);
     let (mut pairs, mut unpaired) = (Vec::new(), [0, 0]);
-    for (first, of) in by_condition(&[a, b]) {
+    for (first, of) in by_condition(&sides) {
         let (of_a, of_b) = (&of[0], &of[1]);
         if of_a.is_empty() || of_b.is_empty() {
             unpaired[0] += of_a.len();
@@ -301,6 +347,7 @@ pub fn compare(a: &Side<'_>, b: &Side<'_>) -> Option<Comparison> {
             speed_m_s: first.speed_m_s,
             direction: i8::from(first.direction),
             normal_force_n: first.normal_force_n,
+            air: air_of(first, &set),
             a: means[0],
             b: means[1],
             difference: means[1].mu_relative - means[0].mu_relative,
@@ -308,7 +355,7 @@ pub fn compare(a: &Side<'_>, b: &Side<'_>) -> Option<Comparison> {
         });
     }
     let judged = judge(&pairs, shared_variance(&references));
-    Some(Comparison { references, pairs, unpaired, judged })
+    Comparison { references, pairs, unpaired, judged }
 }
 
 fn shared_variance(references: &[Reference; 2]) -> f64 {

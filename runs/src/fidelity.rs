@@ -109,8 +109,8 @@ pub struct Group {
     /// Way in m by which the measured friction comes after the wanted one, forward and backward; negative:
     /// before it.
     pub shift_m: [Option<f64>; 2],
-    /// Standard deviation of that way over the passes, in m.
-    pub shift_sd_m: f64,
+    /// Standard deviation of that way over the passes, in m; none of single passes.
+    pub shift_sd_m: Option<f64>,
     /// Root-mean-square difference of `mu'` once that way is taken out.
     pub rms_shifted: f64,
     /// The same with the known delay taken out; none where no dynamics are known.
@@ -184,6 +184,7 @@ pub struct Collector {
 
 /// Places of a profile.
 const PLACES: usize = 200;
+
 impl Collector {
     /// Takes a row.
     pub fn row(&mut self, row: &Row) {
@@ -264,6 +265,8 @@ fn group(
     let [forward, backward] = [ways(true), ways(false)];
     let off = [&forward, &backward].map(|w| w.iter().map(|v| (v - mean(w)).powi(2)).sum::<f64>());
     let shift_of = |w: &[f64]| (!w.is_empty()).then(|| mean(w));
+    // Passes beyond the one that gives the shift of each way.
+    let spare = passes.len().saturating_sub([&forward, &backward].iter().filter(|w| !w.is_empty()).count());
     let delay = (mean(&late.ways) / (speed * cycle_s)).round().max(0.0) as usize;
     let bins = |segments: usize| {
         let mut spectra = Spectra::for_passes(passes.iter().map(|p| p.samples.len()), segments, cycle_s);
@@ -292,7 +295,7 @@ fn group(
         rms_command: rms(|s| s.predicted - s.wanted),
         rms_law: rms(|s| s.measured - s.predicted),
         shift_m: [shift_of(&forward), shift_of(&backward)],
-        shift_sd_m: (off.iter().sum::<f64>() / passes.len().saturating_sub(2).max(1) as f64).sqrt(),
+        shift_sd_m: (spare > 0).then(|| (off.iter().sum::<f64>() / spare as f64).sqrt()),
         rms_shifted: late.rms_shifted,
         rms_known: late.rms_known,
         rms_held_out: late.rms_held_out,

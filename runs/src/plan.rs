@@ -29,6 +29,7 @@ pub(crate) use points::series_place;
 pub use points::{Point, Resolution};
 pub use reach::{Reach, times};
 pub use render::{Control, RenderPlan, TargetKind};
+pub(crate) use steps::SKIN_MOISTURE;
 pub use steps::{Action, Step, When};
 pub use visible::{COUNTS_MIN, LateralChannel};
 
@@ -236,6 +237,12 @@ impl Series {
             (&covariate::POSITION, &self.position_m),
             (&covariate::AMPLITUDE, &self.amplitude_pp_m),
         ]
+    }
+
+    /// Its levels of the air, in the order of [`crate::ambient::AIR`].
+    pub fn air(&self) -> [(&'static Covariate, &[f64]); 3] {
+        let [pressure, temperature, humidity, ..] = self.lists();
+        [pressure, temperature, humidity]
     }
 }
 

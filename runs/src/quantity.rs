@@ -39,7 +39,8 @@ pub fn parse(text: &str, unit: &str) -> Result<f64, String> {
             "m/s" => "20mm/s or 0.02",
             "N" => "250mN or 0.25",
             "N/m" => "3.9N/um or 3.9e6",
-            "Pa" => "28.3MPa or 28.3e6",
+            "Pa" => "101.325kPa, 28.3MPa or 28.3e6",
+            "" => return "a number is needed".into(),
             "s" => "500ms or 0.5",
             _ => "a number",
         };

@@ -24,7 +24,7 @@ pub mod plots;
 pub mod published;
 pub mod traces;
 
-use crate::run_dir::{differences, missing_records, of_file, open_record, passes_in, records_in};
+use crate::run_dir::{differences, missing_records, of_record, open_record, passes_in, records_in};
 use crate::sequence::MeasuredPass;
 use crate::session::Summary;
 use models::finger::Finger;
@@ -90,7 +90,7 @@ pub fn read(folder: &Path) -> miette::Result<RunData> {
                 Entry::Facts { .. } => {}
             }
         }
-        damage.extend(reader.integrity().sentences().iter().map(|s| of_file(&path, s)));
+        damage.extend(of_record(&path, reader.integrity().clone()));
     }
     damage.extend(differences(folder, &passes)?);
     let summary =

@@ -13,10 +13,11 @@ use crate::files::{self, Placed, write_plain};
 use crate::plan::Point;
 use crate::sequence::MeasuredPass;
 use crate::session::Notes;
-pub use damage::{damage_in, differences, missing_records, of_file};
+use calibration::certificate::sha256_hex;
+pub use damage::{damage_in, differences, missing_records, of_record};
 pub use journal::passes_in;
 use lines::{whole_passes, whole_table};
-pub use lock::{claim, holder, is_held};
+pub use lock::{NAME as LOCK, claim, holder, is_held};
 use miette::{Context, IntoDiagnostic};
 use models::pass::{self, Pass};
 use realtime::recorder::Reader;
@@ -40,14 +41,17 @@ pub struct Identity {
     /// Passes planned; 0 where no folder has been opened for them.
     #[serde(default)]
     pub planned: usize,
-    /// SHA-256 of the setup's text.
+    /// SHA-256 of the setup's text and of its own tip, certificates and profiles.
     pub setup_sha256: String,
-    /// SHA-256 of the plan's text.
+    /// SHA-256 of the plan's text and of its target's file.
     pub plan_sha256: String,
     /// Seed of the order.
     pub seed: u64,
     /// SHA-256 of the model file, or the model's name.
     pub model: String,
+    /// SHA-256 of the defects that a virtual rig has in place of its own.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub defects_sha256: Option<String>,
     /// The setup names a human fingertip, and says that nobody touches the plate.
     #[serde(default, skip_serializing_if = "std::ops::Not::not")]
     pub nobody_touches_the_plate: bool,
@@ -57,6 +61,11 @@ pub struct Identity {
     /// The plan's `[protocol]`.
     #[serde(default, skip_serializing_if = "BTreeMap::is_empty")]
     pub protocol: BTreeMap<String, toml::Value>,
+}
+
+/// SHA-256 of a text and of the files that it names.
+pub(crate) fn sha256_of<'a>(text: &str, files: impl Iterator<Item = &'a [u8]>) -> String {
+    sha256_hex(files.fold(text.to_string(), |all, file| all + &sha256_hex(file)).as_bytes())
 }
 
 /// One session of a run: from its start until its end, a stop or a crash. A resumed run has several.
@@ -108,6 +117,20 @@ impl Drop for New {
     }
 }
 
+impl Identity {
+    /// What of it another run has otherwise.
+    pub(crate) fn other_than(&self, before: &Identity) -> Vec<&'static str> {
+        let parts = [
+            ("setup", before.setup_sha256 == self.setup_sha256),
+            ("plan", before.plan_sha256 == self.plan_sha256),
+            ("seed", before.seed == self.seed),
+            ("model", before.model == self.model),
+            ("set of defects", before.defects_sha256 == self.defects_sha256),
+        ];
+        parts.into_iter().filter(|(_, same)| !same).map(|(name, _)| name).collect()
+    }
+}
+
 const IDENTITY: &str = "run.toml";
 const POINTS: &str = "points.csv";
 /// The journal in a run's folder: a line a pass, safe on the disk before the next one begins.
@@ -128,21 +151,17 @@ impl RunDir {
         let mut before_notes = Notes::default();
         if path.join(IDENTITY).exists() {
             let before = identity_in(path)?;
-            let parts = [
-                ("setup", before.setup_sha256 == identity.setup_sha256),
-                ("plan", before.plan_sha256 == identity.plan_sha256),
-                ("seed", before.seed == identity.seed),
-                ("model", before.model == identity.model),
-            ];
-            let other: Vec<_> = parts.iter().filter(|(_, same)| !same).map(|(name, _)| *name).collect();
-            if !other.is_empty() {
-                miette::bail!(
-                    help = "give another --out, or the same plan, setup, seed and model to go on with it",
-                    "{shown} holds a run with another {}",
-                    other.join(" and ")
-                );
+            let other = identity.other_than(&before);
+            miette::ensure!(
+                other.is_empty(),
+                help = "give another --out, or the same plan, setup, seed, model and defects to go on with it; the files \
+                        that plan and setup name (tip, certificates, profiles, target) belong to them",
+                "{shown} holds a run with another {}",
+                other.join(" and ")
+            );
+            if fs::metadata(path.join(JOURNAL)).is_ok_and(|journal| journal.len() > 0) {
+                identity.notes.agree_with(&before.notes, path)?;
             }
-            identity.notes.agree_with(&before.notes, path)?;
             before_notes = before.notes;
         } else if path.exists() && holds_something(path)? {
             miette::bail!(

@@ -96,20 +96,21 @@ impl Notes {
     /// Another operator, subject or sample than the run in this folder has.
     pub fn agree_with(&self, before: &Notes, folder: &Path) -> miette::Result<()> {
         let all = [
-            ("operator", &self.operator, &before.operator),
-            ("subject", &self.subject, &before.subject),
-            ("sample", &self.sample, &before.sample),
+            ("operator", &self.operator, before.operator.as_ref()),
+            // Exposure counts for the operator where no subject is stated.
+            ("subject", &self.subject, before.subject.as_ref().or(before.operator.as_ref())),
+            ("sample", &self.sample, before.sample.as_ref()),
         ];
         for (name, now, before) in all {
-            let (Some(now), Some(before)) = (now, before) else { continue };
-            let shown = folder.display();
+            let Some(now) = now else { continue };
+            let (shown, was) = (folder.display(), before.map_or("not stated", String::as_str));
             miette::ensure!(
-                now == before,
+                before == Some(now),
                 help = format!(
                     "give another --out for another {name}; to go on with this run, leave --{name} away (`muprime runs {shown} \
                      --note TEXT` notes more)"
                 ),
-                "{shown} holds a run whose {name} is '{before}', not '{now}'"
+                "{shown} holds passes of a run whose {name} is '{was}', not '{now}'"
             );
         }
         Ok(())
@@ -259,9 +260,10 @@ impl Job {
             setup: self.setup.file.name.clone(),
             planned: 0,
             setup_sha256: self.setup.sha256(),
-            plan_sha256: sha256_hex(self.plan.text.as_bytes()),
+            plan_sha256: self.plan.sha256(),
             seed: self.seed,
             model,
+            defects_sha256: self.defects.as_ref().map(|d| sha256_hex(format!("{d:?}").as_bytes())),
             nobody_touches_the_plate: self.setup.file.finger.nobody_touches_the_plate,
             notes: self.notes.clone(),
             protocol: self.plan.protocol(),

@@ -180,7 +180,7 @@ fn judge(kind: &'static str, name: &str, on: &On, instead: Option<String>) -> mi
         "table" => written::table(path),
         "record" => written::record(path).map(|()| good(None)),
         "journal" => written::journal(path).map(good),
-        "run" => written::run_folder(path).map(Some).map(good),
+        "run" => written::run_folder(path),
         "verdict" => written::verdict(name).map(|()| good(None)),
         "import log" => Ok(good(None)),
         "summary" => holds::<Summary>(name).map(|()| good(None)),

@@ -1,6 +1,7 @@
 //! `muprime compare RUN_A RUN_B [RUN]...`: two runs side by side, or more of them by groups.
 
 use super::prelude::*;
+use runs::ambient::air_words;
 use runs::compare::Compared;
 use runs::compare::differences::Difference;
 use runs::compare::groups::{GroupBy, Grouped, MOST_COMPARED};
@@ -94,7 +95,7 @@ fn terminal(Compared { comparison: result, warnings: warned, differences: differ
     for p in worst.iter().take(PRINTED) {
         let _ = writeln!(
             w,
-            "  {:5.2} {:7.1} {:+8.1} {:5.2}  {:5.2} {:7.2} {:+11.3} {:+5.1}",
+            "  {:5.2} {:7.1} {:+8.1} {:5.2}  {:5.2} {:7.2} {:+11.3} {:+5.1}{}",
             p.amplitude_pp_m * 1e6,
             p.frequency_hz / 1e3,
             p.speed_m_s * f64::from(p.direction) * 1e3,
@@ -102,7 +103,8 @@ fn terminal(Compared { comparison: result, warnings: warned, differences: differ
             p.a.mu_relative,
             p.b.mu_relative,
             p.difference,
-            p.deviations()
+            p.deviations(),
+            air_words(&p.air).map(|level| format!("  {level}")).collect::<String>()
         );
     }
     let none = if differ.is_empty() { "none in the records" } else { "" };

@@ -12,7 +12,8 @@ pub struct Args {
     file: PathBuf,
 }
 
-/// Recovers; refused: a file that is not there, or that holds nothing of a record; nothing is written then.
+/// Recovers; refused: a file that is not there, or that holds nothing of a record; the record of a live
+/// run. Nothing is written then.
 pub fn run(args: Args, json: bool) -> miette::Result<ExitCode> {
     let file = &args.file;
     let shown = || file.display().to_string();
@@ -20,6 +21,10 @@ pub fn run(args: Args, json: bool) -> miette::Result<ExitCode> {
     if !fs::metadata(file).into_diagnostic().wrap_err_with(shown)?.is_file() {
         miette::bail!(help = "give a record, run-1.mcap and the like", "{} is not an ordinary file", shown());
     }
+    // Held to the end: a session would write on into the record that is replaced.
+    let lock = file.with_file_name(runs::run_dir::LOCK);
+    let held = lock.exists().then(|| runs::run_dir::claim(&lock)).transpose();
+    let _held = held.wrap_err_with(|| format!("{}: its run is live", shown()))?;
     let damaged = BufReader::new(File::open(file).into_diagnostic().wrap_err_with(shown)?);
     let part = files::beside(file);
     let whole = Placed::fresh(&part)?;

@@ -13,6 +13,7 @@ use rig::live::{self, Feed};
 use rig::publish::{Broker, Publisher};
 use rig::watch::{Lead, Watch};
 use runs::catalogue::runs_folder;
+use runs::files::make_folder;
 use runs::plan::Plan;
 use runs::print::{self, clean, folded};
 use runs::sequence::{Event, Outcome};
@@ -104,7 +105,10 @@ pub fn run(mut args: Args, json: bool) -> miette::Result<ExitCode> {
     if let Some((text, folder)) = runs::campaign::text_of(&args.plan)? {
         return campaign::run(args, &text, &folder, json);
     }
-    let job = job(&args)?;
+    let (setup, plan) = (super::setup(&args.setup)?, super::plan(&args.plan)?);
+    let seed = args.seed.unwrap_or(plan.file.seed);
+    let folder = Folder::of(args.out.clone(), &plan.file.name)?;
+    let job = job_of(&args, setup, plan, seed, folder.path.clone())?;
     // An address that is taken is a refusal: nothing was touched yet.
     let (points, followed) = job.points_seen(None)?;
     let mu0 = job.setup.tip.mu0;
@@ -117,9 +121,6 @@ pub fn run(mut args: Args, json: bool) -> miette::Result<ExitCode> {
             job.model.name(),
             points.len()
         ),
-    }
-    if !job.fast {
-        super::tell_beside(&job.out)?;
     }
     let runs = job.out.parent().filter(|p| !p.as_os_str().is_empty()).unwrap_or(Path::new("."));
     serve(&mut args, runs)?;
@@ -307,13 +308,6 @@ fn tripped(trip: &realtime::safety::Trip) -> Value {
     })
 }
 
-fn job(args: &Args) -> miette::Result<Job> {
-    let (setup, plan) = (super::setup(&args.setup)?, super::plan(&args.plan)?);
-    let seed = args.seed.unwrap_or(plan.file.seed);
-    let out = args.out.clone().unwrap_or_else(|| runs_folder().join(new_name(&plan.file.name)));
-    job_of(args, setup, plan, seed, out)
-}
-
 /// A run of this plan on this setup, with what the arguments say beside.
 fn job_of(args: &Args, setup: Setup, plan: Plan, seed: u64, out: PathBuf) -> miette::Result<Job> {
     if args.defects.is_some() && setup.file.virtual_rig.is_none() {
@@ -333,10 +327,40 @@ fn job_of(args: &Args, setup: Setup, plan: Plan, seed: u64, out: PathBuf) -> mie
     Ok(Job { setup, plan, seed, model, model_file, defects, out, fast, notes, answers })
 }
 
-/// Name of a new run: UTC date and time, and the plan.
-fn new_name(plan: &str) -> String {
-    let now = calibration::certificate::date::format((unix_ns() / 1_000_000_000) as i64);
-    format!("{}-{plan}", now.replace(['-', ':', 'Z'], "").replace('T', "-"))
+/// The folder of a run or campaign. What of it was made here goes again where nothing comes of it.
+struct Folder {
+    path: PathBuf,
+    made: Vec<PathBuf>,
+}
+
+impl Folder {
+    /// The folder that the arguments name; else a new one, by UTC date and time and the plan's name. Runs of
+    /// one second have one each: the second would go on with the first.
+    fn of(named: Option<PathBuf>, plan: &str) -> miette::Result<Self> {
+        if let Some(path) = named {
+            return Ok(Folder { path, made: Vec::new() });
+        }
+        let now = calibration::certificate::date::format((unix_ns() / 1_000_000_000) as i64);
+        let plain = plan.replace(|c: char| matches!(c, '/' | '\\') || c.is_control(), "-");
+        let name = format!("{}-{plain}", now.replace(['-', ':', 'Z'], "").replace('T', "-"));
+        let mut made = make_folder(&runs_folder())?;
+        let (mut path, mut n) = (runs_folder().join(&name), 1);
+        while let Err(why) = std::fs::create_dir(&path) {
+            let taken = why.kind() == std::io::ErrorKind::AlreadyExists;
+            taken.then_some(()).ok_or(why).into_diagnostic().wrap_err_with(|| path.display().to_string())?;
+            n += 1;
+            path = runs_folder().join(format!("{name}-{n}"));
+        }
+        made.push(path.clone());
+        Ok(Folder { path, made })
+    }
+}
+
+impl Drop for Folder {
+    fn drop(&mut self) {
+        // Only an empty folder goes.
+        self.made.iter().rev().for_each(|folder| drop(std::fs::remove_dir(folder)));
+    }
 }
 
 /// SIGINT, SIGTERM and SIGHUP ask for a stop; a second one leaves within two seconds whatever happens.
@@ -413,7 +437,7 @@ fn tell(summary: &Summary, json: bool) {
         let fault = link["fault"].as_str().filter(|fault| !fault.is_empty());
         fault.iter().for_each(|fault| report!("`{name}` reports: {fault}"));
     }
-    if summary.passes < summary.planned {
+    if summary.passes < summary.planned && summary.off.read_back {
         report!("to resume, repeat the command with --out {}", summary.folder.display());
     }
     // Passes that render are not compared with the model.
@@ -424,8 +448,12 @@ fn tell(summary: &Summary, json: bool) {
         report!("{psi_star}");
     }
     remarked.remarks.iter().for_each(|remark| report!("{remark}"));
+    let page = summary.folder.join("report.html");
+    if !page.is_file() {
+        return;
+    }
     if summary.model_departed {
         report!("next: muprime diagnose {}", summary.folder.display());
     }
-    report!("report: {}", summary.folder.join("report.html").display());
+    report!("report: {}", page.display());
 }

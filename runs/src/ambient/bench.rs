@@ -4,7 +4,7 @@
 #![allow(clippy::disallowed_methods, reason = "a gauge's reading has an age by the wall clock")]
 
 use super::{AIR, Found, OfAir, Source};
-use crate::sequence::{Question, Reaction, Sequence};
+use crate::sequence::{Outcome, Question, Reaction, Sequence};
 use crate::setup::Setup;
 use drivers::chamber::Chamber;
 use miette::{IntoDiagnostic, WrapErr};
@@ -67,7 +67,7 @@ impl Answers {
         let text = crate::input::text_of(path)?;
         let line =
             |line: &str| Some(line.trim().to_string()).filter(|l| !l.is_empty() && !l.starts_with('#'));
-        Ok(Answers::File(text.lines().filter_map(line).collect()))
+        Ok(Answers::File(text.trim_start_matches('\u{feff}').lines().filter_map(line).collect()))
     }
 
     /// The terminal's lines, read on a thread of their own.
@@ -149,8 +149,14 @@ impl Bench {
             }
         }
         self.question = reaction.question.or(self.question);
-        if reaction.outcome.is_some() {
+        if let Some(outcome) = &reaction.outcome {
             self.question = None;
+            if let (Outcome::Complete, Answers::File(left)) = (outcome, &self.answers)
+                && !left.is_empty()
+            {
+                let (left, which) = (left.len(), "did the others answer the questions that they are for?");
+                tracing::warn!("{left} lines of the file of answers were not needed: {which}");
+            }
         }
         if self.question.is_some_and(|question| self.has_set(question, now))
             && let Some(question) = self.question

@@ -1,21 +1,19 @@
 //! Where a campaign's plan, setups and tips are, and whether they are still those of its sessions.
 
 use super::{Campaign, FILE, sessions};
-use crate::{files, input, run_dir};
-use calibration::certificate::sha256_hex;
+use crate::run_dir::{self, Identity};
+use crate::{files, input};
 use miette::IntoDiagnostic;
 use serde::{Deserialize, Serialize};
 use std::path::{Path, PathBuf};
 
-/// In a campaign's folder: where its own files are, and what its tips were.
+/// In a campaign's folder: where its own files are.
 const ORIGIN: &str = "origin.json";
 
 #[derive(Serialize, Deserialize)]
 struct Origin {
     /// The folder that the paths of the campaign are relative to.
     folder: PathBuf,
-    /// SHA-256 of the values of each cell's tip: a setup's hash does not contain them.
-    tips: Vec<String>,
 }
 
 fn stored(folder: &Path) -> miette::Result<Option<Origin>> {
@@ -42,42 +40,37 @@ pub(super) fn of_folder(folder: &Path) -> miette::Result<PathBuf> {
 }
 
 impl Campaign {
-    fn tips(&self) -> Vec<String> {
-        let hash = |setup: &crate::setup::Setup| {
-            let tip = serde_json::json!([setup.tip.kind, setup.tip.mu0, setup.tip.finger]);
-            sha256_hex(tip.to_string().as_bytes())
-        };
-        self.setups.iter().map(hash).collect()
-    }
-
     /// Writes where this campaign's files are into the folder of its results.
     pub(super) fn store_origin(&self, folder: &Path) -> miette::Result<()> {
-        let origin = Origin { folder: self.folder.canonicalize().into_diagnostic()?, tips: self.tips() };
+        let origin = Origin { folder: self.folder.canonicalize().into_diagnostic()? };
         files::write_plain(&folder.join(ORIGIN), serde_json::to_string(&origin).into_diagnostic()?)
     }
 
-    /// Refuses to go on where plan, setup or tip are other ones than a session that was made had: the
-    /// sessions could not be compared.
-    pub(super) fn unchanged(&self, folder: &Path) -> miette::Result<()> {
-        let plan = sha256_hex(self.plan.text.as_bytes());
-        let (origin, tips) = (stored(folder)?, self.tips());
+    /// Refuses to go on where a session that was made had another plan, setup (with the files that it names),
+    /// model or other defects than `now`: the sessions could not be compared.
+    pub(super) fn unchanged(&self, folder: &Path, now: &Identity) -> miette::Result<()> {
         for session in sessions(&self.file) {
             let run = folder.join(&session.folder);
             if !run_dir::has_begun(&run) {
                 continue;
             }
             let (before, setup) = (run_dir::identity_in(&run)?, &self.setups[session.cell]);
-            let tip_was = origin.as_ref().and_then(|origin| origin.tips.get(session.cell));
-            let changed = [
-                ("plan", &self.plan.origin, before.plan_sha256 == plan),
-                ("setup", &setup.origin, before.setup_sha256 == setup.sha256()),
-                ("tip", &setup.file.finger.tip, tip_was.is_none_or(|was| *was == tips[session.cell])),
-            ];
-            if let Some((what, file, _)) = changed.iter().find(|(.., same)| !same) {
+            let now = Identity { setup_sha256: setup.sha256(), seed: before.seed, ..now.clone() };
+            if let Some(what) = now.other_than(&before).first() {
+                let files = match *what {
+                    "plan" => format!(" '{}' or its target", self.plan.origin),
+                    "setup" => {
+                        format!(
+                            " '{}', its tip '{}', a certificate or a profile",
+                            setup.origin, setup.file.finger.tip
+                        )
+                    }
+                    _ => String::new(),
+                };
                 miette::bail!(
                     help =
                         "give another --out, or the file as it was: all sessions of a campaign are compared",
-                    "{}: the {what} '{file}' was changed after session {} was made with it ({})",
+                    "{}: the {what}{files} was changed after session {} was made with it ({})",
                     folder.join(FILE).display(),
                     session.number,
                     run.display()

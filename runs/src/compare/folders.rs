@@ -1,7 +1,7 @@
 //! Two runs' folders compared: statistics, what must be minded, what differed.
 
 use super::differences::{Difference, between, warnings};
-use super::{Comparison, Side, compare};
+use super::{Comparison, Reference, Side, compare};
 use crate::run_dir::record_facts;
 use miette::{IntoDiagnostic, WrapErr};
 use models::rig_file::PassNoise;
@@ -34,15 +34,8 @@ impl Compared {
         let [facts_a, facts_b] = [record_facts(folders[0])?, record_facts(folders[1])?];
         let [noise_a, noise_b] = [noise(folders[0])?, noise(folders[1])?];
         let sides = [Side::of(&a, noise_a), Side::of(&b, noise_b)];
-        let bare = folders.iter().zip(&sides).filter(|(_, side)| side.reference().is_none());
-        let bare: Vec<String> = bare.map(|(folder, _)| folder.display().to_string()).collect();
-        let comparison = compare(&sides[0], &sides[1]).ok_or_else(|| {
-            miette::miette!(
-                help = "mu' is friction over that without vibration: both runs need such passes",
-                "{}: no pass without vibration",
-                bare.join(" and ")
-            )
-        })?;
+        let [first, second] = [0, 1].map(|i| reference(&sides[i], folders[i]));
+        let comparison = compare([&sides[0], &sides[1]], [first?, second?]);
         let [table_a, table_b] = [table(folders[0])?, table(folders[1])?];
         let mut warnings = warnings(&facts_a, &facts_b, table_a == table_b);
         let comparison = if warnings.is_empty() { comparison } else { comparison.of_one_noise() };
@@ -57,6 +50,11 @@ impl Compared {
             about: [a.about, b.about],
         })
     }
+}
+
+/// `mu_0` of a run; the error names its folder.
+pub(super) fn reference(side: &Side, folder: &Path) -> miette::Result<Reference> {
+    side.reference().map_err(|why| miette::miette!("{}: {why}", folder.display()))
 }
 
 pub(super) fn noise(folder: &Path) -> miette::Result<PassNoise> {

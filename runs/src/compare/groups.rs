@@ -5,22 +5,22 @@
 //! the stated noise makes of it where that is more. A group of one run has the stated noise alone, and its
 //! interval does not hold how far another run would lie.
 
-use super::{Reference, Side, by_condition, folders::noise};
+use super::folders::{noise, reference};
+use super::{Reference, Side, air_of, by_condition, set_by};
+use crate::plan::SKIN_MOISTURE;
 use crate::report::RunData;
 use crate::run_dir::sessions_in;
 use calibration::certificate::date;
 use clap::ValueEnum;
 use miette::WrapErr;
+use models::condition::Ambient;
 use models::pass::Pass;
-use models::rig_file::PassNoise;
 use serde::{Deserialize, Serialize};
 use statrs::distribution::{ContinuousCDF, Normal, StudentsT};
 use std::path::{Path, PathBuf};
 
 /// Runs in a comparison at most.
 pub const MOST_COMPARED: usize = 40;
-/// The quantity that a person types after a measurement of the skin's moisture.
-const SKIN_MOISTURE: &str = "skin_moisture_au";
 /// Width of a level of moisture, in its unit.
 const MOISTURE_STEP: f64 = 10.0;
 
@@ -87,6 +87,9 @@ pub struct AtCondition {
     pub velocity_m_s: f64,
     /// Normal force in N.
     pub normal_force_n: f64,
+    /// The levels of the air that a plan sets.
+    #[serde(flatten)]
+    pub air: Ambient,
     /// The mean of each group; none where it lacks the condition.
     pub means: Vec<Option<GroupMean>>,
     /// Each group after the first less the first; none where either lacks the condition.
@@ -108,7 +111,7 @@ pub struct Grouped {
 
 struct Read {
     data: RunData,
-    noise: PassNoise,
+    side: Side,
     group: String,
     reference: Reference,
 }
@@ -174,15 +177,10 @@ impl Grouped {
 fn read(folder: &Path, by: GroupBy) -> miette::Result<Read> {
     let data = crate::report::read(folder)?;
     let noise = noise(folder)?;
-    let reference = Side::of(&data, noise).reference().ok_or_else(|| {
-        miette::miette!(
-            help = "mu' is friction over that without vibration: each run needs such passes",
-            "{}: the run has no pass without vibration",
-            folder.display()
-        )
-    })?;
+    let side = Side::of(&data, noise);
+    let reference = reference(&side, folder)?;
     let group = group_of(folder, &data, by).wrap_err_with(|| folder.display().to_string())?;
-    Ok(Read { data, noise, group, reference })
+    Ok(Read { data, side, group, reference })
 }
 
 fn group_of(folder: &Path, data: &RunData, by: GroupBy) -> miette::Result<String> {
@@ -220,8 +218,8 @@ fn moisture(data: &RunData) -> String {
 }
 
 fn conditions(runs: &[Read], groups: &[String]) -> Vec<AtCondition> {
-    let sides: Vec<Side<'_>> = runs.iter().map(|run| Side::of(&run.data, run.noise)).collect();
-    let mut found = by_condition(&sides.iter().collect::<Vec<_>>());
+    let sides: Vec<&Side> = runs.iter().map(|run| &run.side).collect();
+    let (set, mut found) = (set_by(&sides), by_condition(&sides));
     let at = |(first, passes): &(&Pass, Vec<Vec<&Pass>>)| {
         let of_group = |name: &String| {
             let has = |(i, run): &(usize, &Read)| run.group == *name && !passes[*i].is_empty();
@@ -238,6 +236,7 @@ fn conditions(runs: &[Read], groups: &[String]) -> Vec<AtCondition> {
             frequency_hz: first.frequency_hz,
             velocity_m_s: first.direction.sign() * first.speed_m_s,
             normal_force_n: first.normal_force_n,
+            air: air_of(first, &set),
             means,
             differences,
         }

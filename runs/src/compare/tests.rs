@@ -42,13 +42,8 @@ fn sweep(rng: &mut ChaCha12Rng, shift: f64) -> Vec<Pass> {
 }
 
 fn judged(a: &[Pass], b: &[Pass]) -> Judged {
-    let side = |passes: &'_ [Pass]| -> Vec<Pass> { passes.to_vec() };
-    let (a, b) = (side(a), side(b));
-    let (a, b) = (
-        Side { passes: a.iter().collect(), noise: NOISE },
-        Side { passes: b.iter().collect(), noise: NOISE },
-    );
-    let result = compare(&a, &b).unwrap();
+    let [a, b] = [a, b].map(|passes| Side { passes: passes.to_vec(), sets: [false; 3], noise: NOISE });
+    let result = compare([&a, &b], [a.reference().unwrap(), b.reference().unwrap()]);
     assert_eq!((result.pairs.len(), result.unpaired), (18, [0, 0]));
     result.judged.unwrap()
 }
@@ -103,6 +98,7 @@ fn the_common_shift_is_that_of_the_full_matrix() {
         speed_m_s: 0.01,
         direction: 1,
         normal_force_n: 0.3,
+        air: Ambient::default(),
         a,
         b,
         difference: b.mu_relative - a.mu_relative,

@@ -75,6 +75,7 @@ impl Plan {
             self.check_series(index, &allows, &mut wrong);
             self.check_settable(index, resolution, &mut wrong);
         }
+        self.check_left_behind(&mut wrong);
         wrong.end()?;
         let conditions: Vec<Visit<'_>> =
             (0..self.file.series.len()).flat_map(|index| self.conditions_of(index, resolution)).collect();

@@ -5,6 +5,7 @@ mod file;
 use super::{Plan, Series};
 use crate::fidelity::dynamics::Dynamics;
 use crate::input::Problems;
+use crate::report::human::quantity;
 use models::target::{Feedback, MOST_DELAY, Target};
 use rand::{RngExt, SeedableRng};
 use rand_chacha::ChaCha12Rng;
@@ -181,6 +182,8 @@ impl RenderPlan {
     }
 }
 
+/// Strokes that a target is long at most: one of a thousand is written in mm.
+const LONGEST: f64 = 100.0;
 /// Phase margin in degrees and gain margin that a feedback needs: what the law's slope is off by takes from
 /// the second.
 const MARGINS_MIN: [f64; 2] = [45.0, 2.0];
@@ -234,6 +237,12 @@ impl Plan {
                 "the target covers {low:.1} to {high:.1} mm; the passes slide from {a:.1} to {b:.1} mm"
             );
             let remedy = "lengthen the target, or shorten [pass] measure_m and settle_s".to_string();
+            return Err(self.refused(&["render", "file"], problem, remedy).into());
+        }
+        if high - low > LONGEST * 2.0 * half {
+            let [target, used] = [high - low, 2.0 * half].map(|m| quantity(m, "m"));
+            let problem = format!("the target is {target} long, and the passes slide over {used} of it");
+            let remedy = "write x_m in m, or shorten the target".to_string();
             return Err(self.refused(&["render", "file"], problem, remedy).into());
         }
         Ok(Some(Target { feedback, ..target }))

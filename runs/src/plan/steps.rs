@@ -60,6 +60,9 @@ pub enum Action {
     Confirm,
 }
 
+/// The quantity that a person types after a measurement of the skin's moisture.
+pub(crate) const SKIN_MOISTURE: &str = "skin_moisture_au";
+
 impl Step {
     /// The instruction.
     pub fn instruction(&self) -> &str {
@@ -83,7 +86,7 @@ impl Step {
 
     /// Name of the number that is typed in answer.
     pub fn number_name(&self) -> Option<&str> {
-        self.number.as_deref().or((self.action == Action::MeasureMoisture).then_some("skin_moisture_au"))
+        self.number.as_deref().or((self.action == Action::MeasureMoisture).then_some(SKIN_MOISTURE))
     }
 
     pub(super) fn check(&self, wrong: &mut Problems<'_>) {

@@ -2,8 +2,10 @@
 
 use super::html::{cell, column, columns, escape, glossary, list, note, numeric, row, shell, table};
 use super::plots;
+use crate::ambient::air_words;
 use crate::compare::differences::Difference;
 use crate::compare::{Answer, Compared, Comparison, Mean, Paired};
+use models::condition::Ambient;
 use std::fmt::Write;
 use std::path::Path;
 
@@ -78,12 +80,19 @@ fn about(compared: &Compared, a: &str, b: &str) -> String {
     table("Both runs", &head, names.into_iter().map(row))
 }
 
+/// The cell of the levels of the air, in a table that has the column.
+pub(super) fn air_cell(column: bool, air: &Ambient) -> String {
+    if column { cell(air_words(air).collect::<Vec<_>>().join(", ")) } else { String::new() }
+}
+
 /// Deviations from which a row stands out.
 const STANDS_OUT: f64 = 3.0;
 
 fn pairs(result: &Comparison) -> String {
+    let air = result.pairs.iter().any(|p| p.air != Ambient::default());
     let head =
-        columns("#w, \u{b5}m|#f, kHz|#U, mm/s|#load, N|#\u{3bc}' first|#\u{3bc}' second|#difference|#in sd");
+        columns("#w, \u{b5}m|#f, kHz|#U, mm/s|#load, N|#\u{3bc}' first|#\u{3bc}' second|#difference|#in sd")
+            + &if air { columns("air") } else { String::new() };
     let single = result.pairs.iter().all(|p| p.a.passes == 1 && p.b.passes == 1);
     let mean = |m: &Mean| match single {
         true => format!("{:.3}", m.mu_relative),
@@ -102,7 +111,7 @@ fn pairs(result: &Comparison) -> String {
             format!("{:+.3} &plusmn; {:.3}", p.difference, p.difference_sd),
             format!("{:+.1}", p.deviations()),
         ];
-        format!("<tr{out}>{}</tr>\n", numbers.map(numeric).concat())
+        format!("<tr{out}>{}{}</tr>\n", numbers.map(numeric).concat(), air_cell(air, &p.air))
     };
     let passes = if single { "" } else { " In brackets: passes." };
     format!(

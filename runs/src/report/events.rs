@@ -107,7 +107,10 @@ fn at_rig(event: &Event) -> String {
             };
             format!("AT THE RIG: {step}; then type {what} and press Enter")
         }
-        Event::Answered { step, answer, answered_by, .. } => format!("{step}: {answer} ({answered_by})"),
+        Event::Answered { step, answer, answered_by, refused, .. } => {
+            let refused = refused.iter().map(|why| format!(", NOT TAKEN: {why}")).collect::<String>();
+            format!("{step}: {answer} ({answered_by}){refused}")
+        }
         Event::Waited { step, waited_s } => format!("{step}: waited {waited_s:.0} s"),
         Event::LevelSet { quantity, wanted } => format!("set: {}", of(quantity, *wanted)),
         Event::LevelReached { quantity, wanted, found, source, after_s } => {

@@ -1,9 +1,11 @@
 //! The page of more than two runs: their groups on one figure, and the differences at each condition.
 
+use super::comparison::air_cell;
 use super::explore::{place, script};
 use super::html::{cell, column, columns, escape, glossary, list, note, numeric, row, shell, table};
 use super::plots::comparison::{group_differences, group_overlay};
 use crate::compare::groups::{AtCondition, Group, GroupBy, Grouped};
+use models::condition::Ambient;
 use std::fmt::Write;
 use std::path::PathBuf;
 
@@ -57,6 +59,8 @@ fn conditions(compared: &Grouped) -> String {
     head += &compared.groups.iter().map(|g| column(&format!("#{}", escape(&g.name)))).collect::<String>();
     let less = |g: &Group| column(&format!("#{} less first", escape(&g.name)));
     head += &compared.groups[1..].iter().map(less).collect::<String>();
+    let air = compared.conditions.iter().any(|c| c.air != Ambient::default());
+    head += &if air { columns("air") } else { String::new() };
     let row = |c: &AtCondition| {
         let (w, f, u) = (c.amplitude_pp_m * 1e6, c.frequency_hz / 1e3, c.velocity_m_s * 1e3);
         let [w, f, u, n] =
@@ -76,7 +80,7 @@ fn conditions(compared: &Grouped) -> String {
             let apart = d.is_some_and(|d| d.interval_95[0] > 0.0 || d.interval_95[1] < 0.0);
             let _ = write!(cells, "<td class=\"n{}\">{text}</td>", if apart { " out" } else { "" });
         }
-        format!("<tr>{cells}</tr>\n")
+        format!("<tr>{cells}{}</tr>\n", air_cell(air, &c.air))
     };
     format!(
         "<h2>Condition by condition</h2>{}{}",

@@ -1,13 +1,16 @@
 //! The page: words and tables around the figures.
 
 use super::RunData;
+use super::comparison::air_cell;
 use super::html::{cell, columns, escape, glossary, head, list, note, row, shell, table};
 use super::human::number;
 use super::published::Published;
 use super::traces::Trace;
 use super::{about, events, explore, fidelity, plots, published};
 use crate::ambient::{AIR, LevelsFound, levels_of};
+use crate::input::unit_of;
 use crate::sequence::Outcome;
+use models::condition::Ambient;
 use std::fmt::Write;
 
 pub(super) fn page(run: &RunData, traces: &[Trace], overlay: &[Published]) -> miette::Result<String> {
@@ -115,7 +118,7 @@ fn levels(run: &RunData) -> String {
     let row = |f: &LevelsFound| {
         let known = AIR.iter().find(|(covariate, _)| covariate.name == f.quantity);
         let (name, (factor, unit)) =
-            known.map_or((f.quantity.as_str(), (1.0, "")), |(c, _)| (c.words, c.shown));
+            known.map_or((&*f.quantity, (1.0, unit_of(&f.quantity))), |(c, _)| (c.words, c.shown));
         let value = |v: f64| number(v * factor);
         format!(
             "<tr><td>{}</td><td>{unit}</td><td class=\"n\">{}</td><td class=\"n\">{}</td>\
@@ -166,20 +169,20 @@ fn timing(w: &mut String, run: &RunData) -> miette::Result<()> {
 }
 
 fn passes(w: &mut String, run: &RunData) {
+    let air = run.passes.iter().any(|p| p.levels_set() != Ambient::default());
     let head = columns(
         "pass|w, &micro;m|f, kHz|U, mm/s|direction|load, N|lateral force, N|&mu;'|&plusmn;|predicted|&plusmn;|difference|surprise, sd",
-    );
+    ) + &if air { columns("air") } else { String::new() };
     let mut rows = String::new();
     for p in &run.passes {
         let c = p.comparison;
-        let number =
-            |v: Option<f64>, digits: usize| v.map_or("&ndash;".to_string(), |v| format!("{v:.digits$}"));
-        let signed =
-            |v: Option<f64>, digits: usize| v.map_or("&ndash;".to_string(), |v| format!("{v:+.digits$}"));
+        let or = |shown: Option<String>| shown.unwrap_or_else(|| "&ndash;".into());
+        let number = |v: Option<f64>, digits: usize| or(v.map(|v| format!("{v:.digits$}")));
+        let signed = |v: Option<f64>, digits: usize| or(v.map(|v| format!("{v:+.digits$}")));
         let _ = writeln!(
             rows,
             "<tr><td>{}{}</td><td>{:.3}</td><td>{:.2}</td><td>{:.1}</td><td>{}</td><td>{:.4}</td><td>{}</td><td>{}</td>\
-             <td>{}</td><td>{}</td><td>{}</td><td>{}</td><td>{}</td></tr>",
+             <td>{}</td><td>{}</td><td>{}</td><td>{}</td><td>{}</td>{}</tr>",
             p.pass.point,
             if p.temperature_flags.is_empty() { "" } else { "*" },
             p.pass.amplitude.micrometres(),
@@ -194,6 +197,7 @@ fn passes(w: &mut String, run: &RunData) {
             number(c.map(|c| c.predicted_sd), 3),
             signed(c.and_then(|c| Some(c.mu_relative? - c.predicted)), 3),
             signed(c.map(|c| c.z), 1),
+            air_cell(air, &Ambient::of(&p.pass.condition(1.0))),
         );
     }
     let all = table("All passes", &head, [rows]).replacen("<table>", "<table class=\"nums\">", 1);

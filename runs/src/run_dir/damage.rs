@@ -1,9 +1,10 @@
 //! What of a run's folder is no longer what was written. An error is a file or folder that cannot be read.
 
 use super::lines::{whole_passes, whole_table};
-use super::{IDENTITY, JOURNAL, POINTS, is_held, passes_in, records_in, sessions_in};
+use super::{IDENTITY, JOURNAL, POINTS, SUMMARY, is_held, passes_in, records_in, sessions_in};
 use crate::sequence::MeasuredPass;
 use miette::{Context, IntoDiagnostic};
+use realtime::recorder::Integrity;
 use std::collections::BTreeSet;
 use std::fs::{self, File};
 use std::io::BufReader;
@@ -16,8 +17,7 @@ pub fn damage_in(path: &Path) -> miette::Result<Vec<String>> {
     let mut findings = Vec::new();
     for record in records_in(path)? {
         let file = File::open(&record).into_diagnostic().wrap_err_with(|| record.display().to_string())?;
-        let found = realtime::recorder::inspect(BufReader::new(file));
-        findings.extend(found.sentences().iter().map(|s| of_file(&record, s)));
+        findings.extend(of_record(&record, realtime::recorder::inspect(BufReader::new(file))));
     }
     findings.extend(missing_records(path)?);
     // A folder that `import` made has a table and no run.
@@ -30,9 +30,15 @@ pub fn damage_in(path: &Path) -> miette::Result<Vec<String>> {
     Ok(findings)
 }
 
-/// A finding with the name of the file that it is about.
-pub fn of_file(file: &Path, finding: &str) -> String {
-    format!("{}: {finding}", file.file_name().unwrap_or_default().to_string_lossy())
+/// What is damaged in a record, with the name of its file. The record of a living session has no end yet.
+pub fn of_record(record: &Path, mut found: Integrity) -> Vec<String> {
+    let run = record.parent().unwrap_or(Path::new(""));
+    let last = || records_in(run).is_ok_and(|all| all.last().is_some_and(|last| last == record));
+    if is_held(run) && !run.join(SUMMARY).exists() && last() {
+        found.cut = None;
+    }
+    let name = record.file_name().unwrap_or_default().to_string_lossy();
+    found.sentences().iter().map(|sentence| format!("{name}: {sentence}")).collect()
 }
 
 /// Sessions whose record is gone.

@@ -37,12 +37,13 @@ fn there(path: &Path) -> miette::Result<()> {
     match (path.join(POINTS).exists(), path.join(JOURNAL).exists()) {
         (true, true) => Ok(()),
         (false, true) => miette::bail!(
-            help =
-                "repeat the command of the run with the same --out: it writes the table again from {JOURNAL}",
+            help = format!(
+                "repeat the command of the run with the same --out: it writes the table again from {JOURNAL}"
+            ),
             "{shown}/{POINTS} is missing"
         ),
         (true, false) => miette::bail!(
-            help = "take {JOURNAL} from a copy of the folder: the table alone can be diagnosed",
+            help = format!("take {JOURNAL} from a copy of the folder; the table alone can be diagnosed"),
             "{shown}/{JOURNAL} is missing"
         ),
         (false, false) => miette::bail!(
@@ -64,7 +65,7 @@ fn agree(path: &Path, table: &[Pass], journal: &[MeasuredPass]) -> miette::Resul
     match table.iter().find(|k| !known.contains(&k.point)) {
         None => Ok(()),
         Some(k) => miette::bail!(
-            help = "take {JOURNAL} and {POINTS} from a copy of the folder, or give another --out",
+            help = format!("take {JOURNAL} and {POINTS} from a copy of the folder, or give another --out"),
             "{}: point {} is in {POINTS} and not in {JOURNAL}: one of them is damaged",
             path.display(),
             k.point
@@ -101,4 +102,22 @@ pub(super) fn rows_of(passes: &[Pass]) -> miette::Result<Vec<u8>> {
     pass::write_passes(passes, &mut table).into_diagnostic()?;
     let header = table.iter().position(|b| *b == b'\n').map_or(0, |i| i + 1);
     Ok(table.split_off(header))
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// The names of the files were missing in the help.
+    #[test]
+    fn what_is_missing_is_named_with_its_remedy() {
+        let folder = tempfile::tempdir().unwrap();
+        for (has, help) in [(POINTS, "take passes.jsonl from a copy"), (JOURNAL, "from passes.jsonl")] {
+            fs::write(folder.path().join(has), "").unwrap();
+            let why = passes_in(folder.path()).unwrap_err();
+            let remedy = why.help().unwrap().to_string();
+            assert!(remedy.contains(help) && !remedy.contains('{'), "{remedy}");
+            fs::remove_file(folder.path().join(has)).unwrap();
+        }
+    }
 }

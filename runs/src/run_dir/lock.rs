@@ -6,7 +6,7 @@ use std::io::Write;
 use std::path::Path;
 
 /// Name of the lock in a run's folder.
-pub(super) const NAME: &str = ".lock";
+pub const NAME: &str = ".lock";
 
 /// Takes a lock: the file stays, named after its present holder, and is locked as long as the answer lives.
 ///

@@ -11,7 +11,8 @@
 
 use super::{Event, Outcome, QUIET_WITHIN, Reaction, STANDS_M_S, Sequence, Stage, Sums, awake};
 use crate::ambient::{AIR, By, Found, Level, Means, OfAir, Source, possible, shown};
-use crate::plan::{Step, When};
+use crate::input::{unit_meant, unit_of};
+use crate::plan::{SKIN_MOISTURE, Step, When};
 use models::condition::{Ambient, Condition};
 use realtime::cycle::{Command, Phase};
 use realtime::estimate::Moments;
@@ -49,6 +50,22 @@ impl Task {
             Task::Level(at, wanted) => format!("set {}", shown(*at, *wanted)),
             Task::Step(step) => step.instruction().to_string(),
         }
+    }
+
+    /// The number of that name in an answer, with or without a unit; an error says why it is none.
+    fn number(&self, name: &str, typed: &str) -> Result<f64, String> {
+        let value = crate::quantity::parse(typed, unit_of(name))?;
+        let [low, high] = match self {
+            Task::Level(at, _) => possible(AIR[*at].0),
+            Task::Step(_) if name == SKIN_MOISTURE => [0.0, 200.0],
+            Task::Step(_) => [f64::MIN, f64::MAX],
+        };
+        let admits = (low..=high).contains(&value);
+        admits.then_some(value).ok_or_else(|| match unit_meant(name, value, [low, high]) {
+            Some(meant) => meant,
+            None if low == f64::MIN => "a finite number is needed".into(),
+            None => format!("{low} to {high} {} is needed", unit_of(name)),
+        })
     }
 }
 
@@ -390,27 +407,39 @@ impl Sequence {
         let Some((text, source)) = self.at_rig.answer.take() else { return };
         let Some(task) = self.at_rig.tasks.front().cloned() else { return };
         let typed = text.trim().replace(',', ".");
-        let number = typed.parse::<f64>().ok().filter(|v| v.is_finite());
-        let (step, needs) = (task.words(), self.at_rig.types(&task).is_some());
-        let after_s = row.now.since(since).seconds();
-        out.events.push(Event::Answered { step, answer: text, number, answered_by: source, after_s });
-        if typed.eq_ignore_ascii_case(AGAIN) {
+        let again = typed.eq_ignore_ascii_case(AGAIN);
+        let needed = self.at_rig.types(&task).filter(|_| !again);
+        let needs = needed.is_some();
+        let judged = match needed {
+            Some(name) => task.number(name, &typed).map(Some),
+            None => Ok(typed.parse::<f64>().ok().filter(|v| v.is_finite())),
+        };
+        let (step, refused) = (task.words(), judged.as_ref().err().cloned());
+        let (number, after_s) = (judged.unwrap_or(None), row.now.since(since).seconds());
+        let taken = refused.is_none();
+        out.events.push(Event::Answered {
+            step,
+            answer: text,
+            number,
+            answered_by: source,
+            after_s,
+            refused,
+        });
+        if again {
             // The step before comes once more, and then this one.
             if let Some(previous) = self.at_rig.previous.take() {
                 self.at_rig.tasks.push_front(previous);
             }
             return self.next_task(row, out);
         }
-        let fits = match (&task, number) {
-            (Task::Level(at, _), Some(v)) if needs => {
-                let [low, high] = possible(AIR[*at].0);
-                (low..=high).contains(&v)
-            }
-            (_, number) => !needs || number.is_some(),
-        };
-        if !fits {
+        if !taken && source == Source::Operator {
             // The question comes again; what does not fit is in the record too.
             return self.next_task(row, out);
+        }
+        if !taken {
+            // The next line of a file answers the next question.
+            out.commands.push(Command::Stop);
+            return self.finish(out, Outcome::Stopped);
         }
         let found = |value: f64| Found { value, at: row.now, source };
         match task {

@@ -141,6 +141,9 @@ pub enum Event {
         answered_by: Source,
         /// s after the question.
         after_s: f64,
+        /// Why it was not taken.
+        #[serde(default, skip_serializing_if = "Option::is_none")]
+        refused: Option<String>,
     },
     /// The timer of a step ran down.
     Waited {
@@ -321,6 +324,7 @@ mod tests {
                 number: Some(1.0),
                 answered_by: Source::Operator,
                 after_s: 1.0,
+                refused: Some("r".into()),
             },
             Event::Waited { step: "s".into(), waited_s: 1.0 },
             Event::LevelSet { quantity: "q".into(), wanted: 1.0 },

@@ -1,7 +1,8 @@
 //! A setup's instruments against their profiles: what is named exists, and fits what it is named for.
 
 use super::{Setup, SetupFile};
-use calibration::certificate::sha256_hex;
+use crate::fingertip::{self, Fingertip};
+use crate::run_dir::sha256_of;
 use drivers::endpoint::Endpoint;
 use drivers::library::{Library, Source};
 use drivers::ports::compose;
@@ -361,17 +362,19 @@ impl Setup {
         files.into_iter().collect()
     }
 
-    /// What identifies the setup: its text, and the texts of profiles that do not come with the program.
+    /// What identifies the setup: its text, and what it names that does not come with the program: profiles,
+    /// certificates, the fingertip's values.
     #[must_use]
     pub fn sha256(&self) -> String {
-        let mut bytes = self.text.clone().into_bytes();
-        for source in self.instruments().all().filter_map(|instrument| instrument.source.as_ref()) {
-            let files = source.files.iter().map(|(_, text)| text);
-            files
-                .chain([&source.text])
-                .for_each(|text| bytes.extend(sha256_hex(text.as_bytes()).into_bytes()));
-        }
-        sha256_hex(&bytes)
+        let instruments = self.instruments();
+        let sources = instruments.all().filter_map(|instrument| instrument.source.as_ref());
+        let mut named: Vec<String> =
+            sources.flat_map(|s| s.files.iter().map(|(_, text)| text).chain([&s.text]).cloned()).collect();
+        named.extend(self.certificates.files.iter().map(|(_, text)| text.clone()));
+        let Fingertip { name, kind, mu0, finger } = &self.tip;
+        let own = crate::bundled::text(fingertip::BUNDLED, &self.file.finger.tip).is_none();
+        named.extend(own.then(|| serde_json::json!([name, kind, mu0, finger]).to_string()));
+        sha256_of(&self.text, named.iter().map(String::as_bytes))
     }
 }
 
@@ -442,6 +445,31 @@ mod tests {
         assert!(full.contains("together"), "{full}");
         let moved = moved.unwrap_err();
         assert!(moved.contains("of its own"), "{moved}");
+    }
+
+    /// A run was taken up with another tip or another certificate, and stated as one.
+    #[test]
+    fn a_tip_of_its_own_and_certificates_are_part_of_a_setups_identity() {
+        let folder = tempfile::tempdir().unwrap();
+        let bundled = Setup::load("virtual-ideal").unwrap();
+        assert_eq!(bundled.sha256(), calibration::certificate::sha256_hex(bundled.text.as_bytes()));
+        let text = bundled.text.replacen("\"artificial-silicone\"", "\"tip.toml\"", 1);
+        let with = |tip: &str| {
+            std::fs::write(folder.path().join("tip.toml"), tip).unwrap();
+            Setup::parse("own", &text, folder.path()).unwrap()
+        };
+        let tip = fingertip::BUNDLED[0].1;
+        let mut setup = with(tip);
+        for other in [tip.replacen("3.9e6", "2.9e6", 1), tip.replacen("mu0 = 0.5", "mu0 = 0.8", 1)] {
+            assert_ne!(other, tip);
+            assert_ne!(with(&other).sha256(), setup.sha256(), "{other}");
+        }
+        assert_eq!(with(&format!("# a comment\n{tip}")).sha256(), setup.sha256());
+        let without = setup.sha256();
+        setup.certificates.files = vec![("certificates/c.toml".into(), "gain 1.00".into())];
+        let first = setup.sha256();
+        setup.certificates.files[0].1 = "gain 0.85".into();
+        assert!(first != without && setup.sha256() != first);
     }
 
     #[test]

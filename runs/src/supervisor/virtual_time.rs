@@ -72,7 +72,12 @@ impl VirtualLoop {
         match amplifier {
             Some(Ok(state)) if !state.output_on => OffReport::off(),
             seen => {
-                let why = format!("the last state: {seen:?}");
+                let why = match seen {
+                    Some(Ok(_)) => "its output was read back on",
+                    Some(Err(_)) => "it does not answer",
+                    None => "it was never read",
+                };
+                let why = why.to_string();
                 let instrument = "amplifier of the virtual rig".into();
                 OffReport { read_back: false, not_read_back: vec![NotOff { instrument, drives: true, why }] }
             }

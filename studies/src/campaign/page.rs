@@ -60,7 +60,8 @@ pub fn page(file: &CampaignFile, made: &[Measured]) -> miette::Result<(String, V
     let _ = write!(w, "<h2>Sessions</h2>{}", session_table(file, made));
     let _ = write!(w, "<h2>For the methods section of a paper</h2><p>{}</p>", escape(&methods(file, made)));
     let next = [
-        "muprime diagnose sessions/* tells whether one unmodelled effect (recovery of the skin, damping, air) causes what is left",
+        "muprime diagnose sessions/NAME tells of one session whether an unmodelled effect (recovery of the skin, damping, air) \
+                 causes what is left",
     ];
     let _ = write!(w, "<h2>Next</h2>{}", list(next, ""));
     Ok((shell(&title, &html), claims))

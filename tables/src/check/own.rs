@@ -116,7 +116,7 @@ fn campaign(path: &Path) -> miette::Result<usize> {
     runs.sort();
     for run in runs.iter().filter(|run| run.is_dir()) {
         match super::written::run_folder(run) {
-            Ok(found) => passes += found,
+            Ok(found) => passes += found.passes.unwrap_or_default(),
             Err(why) => problems.push(format!("{}: {why}", run.display())),
         }
     }

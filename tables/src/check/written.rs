@@ -63,12 +63,12 @@ pub(super) fn journal(path: &Path) -> miette::Result<Option<usize>> {
 }
 
 /// A run's folder: everything in it that is known, and whether its parts agree.
-pub(super) fn run_folder(path: &Path) -> miette::Result<usize> {
+pub(super) fn run_folder(path: &Path) -> miette::Result<Good> {
     const PARTS: [&str; 6] =
         ["run.toml", "points.csv", "rig.toml", "summary.json", "passes.jsonl", "sessions.jsonl"];
     if !path.join("run.toml").exists() {
         miette::bail!(
-            help = "name a folder that `muprime run --out` made",
+            help = "name a folder that `muprime run --out` made; of an imported table check points.csv and rig.toml",
             "{} holds no run: its run.toml is missing",
             path.display()
         );
@@ -88,18 +88,35 @@ pub(super) fn run_folder(path: &Path) -> miette::Result<usize> {
             }
         }
     }
-    let damage = runs::run_dir::damage_in(path)?;
-    helps.extend(damage.iter().map(|damage| match damage.starts_with("run-") {
-        true => "`muprime recover` repairs records; `muprime report` says what a damaged run still tells",
-        false => again(&path.join("points.csv")),
+    let last = runs::run_dir::records_in(path)?.pop().unwrap_or_default();
+    let (mut remarks, damage): (Vec<String>, Vec<String>) =
+        runs::run_dir::damage_in(path)?.into_iter().partition(|found| is_settled(found, &last));
+    helps.extend(damage.iter().map(|damage| {
+        let gone = damage.ends_with("is missing");
+        match damage.starts_with("run-") {
+            true if !gone => {
+                "`muprime recover` repairs records; `muprime report` says what a damaged run still tells"
+            }
+            // The journal has these passes; where both have a value, nothing says which of them was changed.
+            false if damage.ends_with("not in points.csv") => again(&path.join("points.csv")),
+            _ => again(path),
+        }
     }));
     problems.extend(damage);
     if problems.is_empty() {
-        return Ok(passes);
+        remarks.extend(runs::report::about::remarks(&runs::run_dir::passes_in(path)?));
+        return Ok(Good { kind: "run", passes: Some(passes), remarks });
     }
     let mut printed = std::collections::BTreeSet::new();
     helps.retain(|help| printed.insert(*help));
     Err(miette::miette!(help = helps.join("; "), "{}", problems.join("; ")))
+}
+
+/// Whether nothing is left to do about a finding: its record was made whole, or is that of a session that was
+/// killed and taken up by another one.
+fn is_settled(found: &str, last: &Path) -> bool {
+    let of_last = last.file_name().is_some_and(|last| found.starts_with(&*last.to_string_lossy()));
+    found.contains("was made whole by") || found.contains("the record is cut") && !of_last
 }
 
 /// What to do about a part of a run's folder that is damaged.

@@ -1,9 +1,8 @@
 //! `muprime run CAMPAIGN.toml`: the sessions of a campaign that are missing, then its page.
 
-use super::{Args, job_of, measure, new_name, serve};
+use super::{Args, Folder, job_of, measure, serve};
 use crate::verbs::prelude::*;
 use runs::campaign::{self, Campaign};
-use runs::catalogue::runs_folder;
 use runs::session::Job;
 use studies::campaign::claims::Claim;
 
@@ -29,8 +28,8 @@ pub fn run(mut args: Args, text: &str, folder: &Path, json: bool) -> miette::Res
         Some(_) => why,
         None => tables::check::refusal(why, &file, "campaign"),
     })?;
-    let out =
-        args.out.take().or(resumed).unwrap_or_else(|| runs_folder().join(new_name(&campaign.file.name)));
+    let made = Folder::of(args.out.take().or(resumed), &campaign.file.name)?;
+    let out = made.path.clone();
     let given = args.clone();
     let job = |session: &campaign::Session| -> miette::Result<Job> {
         let cell = &campaign.file.cell[session.cell];
@@ -45,7 +44,7 @@ pub fn run(mut args: Args, text: &str, folder: &Path, json: bool) -> miette::Res
     for session in all.iter().take(campaign.file.cell.len()) {
         job(session)?.points()?;
     }
-    campaign.open(&out)?;
+    campaign.open(&out, &job(&all[0])?.identity())?;
     serve(&mut args, &out.join("sessions"))?;
     let mut whole = true;
     for session in &all {

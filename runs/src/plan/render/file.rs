@@ -3,11 +3,22 @@
 use super::{MOST, RenderPlan};
 use crate::input::{BadInput, text_of};
 use crate::plan::Plan;
+use crate::run_dir::sha256_of;
 use models::target::Target;
 use std::path::{Path, PathBuf};
 
 /// Bytes of an image at most.
 const MOST_BYTES: usize = 64 << 20;
+
+impl Plan {
+    /// What identifies the plan: its text, and its target's file. One that cannot be read is another one.
+    #[must_use]
+    pub fn sha256(&self) -> String {
+        let render = self.file.render.as_ref().filter(|render| render.file.is_some());
+        let file = render.map(|render| std::fs::read(render.path(self)).unwrap_or_default());
+        sha256_of(&self.text, file.as_deref().into_iter())
+    }
+}
 
 /// A problem of a file, and the remedy.
 type Refused = (String, &'static str);

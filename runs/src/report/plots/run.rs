@@ -4,6 +4,7 @@ use super::{
     AMPLITUDE, COLOURS, GREY, Span, WIDE, band, beyond, draw, edge_of, eq_20, figure, line, mark, measured,
     mu_axis, mu_on, series_key, wrong,
 };
+use crate::ambient::{air_words, values};
 use crate::report::RunData;
 use crate::report::html::escape;
 use crate::report::human::number;
@@ -22,14 +23,15 @@ fn value(p: &MeasuredPass) -> Option<(f64, f64, f64)> {
     Some((p.pass.amplitude.micrometres(), c.mu_relative?, c.mu_relative_sd?))
 }
 
-/// The passes with vibration at the most common frequency and load: the base of the figure by speed.
+/// The passes with vibration at the most common frequency, load and air: the base of the figure by speed.
 fn at_base(passes: &[MeasuredPass]) -> Vec<&MeasuredPass> {
     let driven: Vec<&MeasuredPass> = passes.iter().filter(|p| p.pass.amplitude > PeakToPeak::ZERO).collect();
     let frequencies = Levels::of(driven.iter().map(|p| p.pass.frequency_hz), FREQUENCY);
     let loads = Levels::of(driven.iter().map(|p| p.pass.normal_force_n), FORCE);
-    let mut settings = std::collections::BTreeMap::<(usize, usize), Vec<&MeasuredPass>>::new();
+    let mut settings = std::collections::BTreeMap::<_, Vec<&MeasuredPass>>::new();
     for p in driven {
-        let setting = (frequencies.index(p.pass.frequency_hz), loads.index(p.pass.normal_force_n));
+        let air = values(&p.levels_set()).map(|level| level.map(f64::to_bits));
+        let setting = (frequencies.index(p.pass.frequency_hz), loads.index(p.pass.normal_force_n), air);
         settings.entry(setting).or_default().push(p);
     }
     settings.into_values().max_by_key(Vec::len).unwrap_or_default()
@@ -93,10 +95,13 @@ pub fn mu_against_amplitude(run: &RunData) -> miette::Result<String> {
     let driven = run.passes.iter().filter(|p| p.pass.amplitude > PeakToPeak::ZERO).count();
     let elsewhere = match driven - chosen.len() {
         0 => String::new(),
-        n => format!(" {n} passes at other frequencies or loads are in the table, not in this figure."),
+        n => format!(
+            " {n} passes at other frequencies, loads or levels of the air are in the table, not in this figure."
+        ),
     };
+    let air: String = air_words(&chosen[0].levels_set()).map(|level| format!(", {level}")).collect();
     Ok(format!(
-        "<figure>{svg}<figcaption>at {f} kHz and {load} N. {}. Short strokes: what was predicted for each pass.{}{elsewhere}</figcaption></figure>",
+        "<figure>{svg}<figcaption>at {f} kHz and {load} N{air}. {}. Short strokes: what was predicted for each pass.{}{elsewhere}</figcaption></figure>",
         escape(&series_key(&speeds.names(), "mm/s")),
         beyond(marks().map(|m| m.1), axis)
     ))
