@@ -51,7 +51,7 @@ fn a_run_without_references_says_that_its_mu_rests_on_the_model() {
     assert!(passes.lines().all(has_load), "{passes}");
     let compared = muprime().arg("compare").args([&with, &out]).output().unwrap();
     let why = texts(&compared).1;
-    assert!(why.contains("bare: no pass") && !why.contains("short"), "{why}");
+    assert!(why.contains("bare: the run has no pass") && !why.contains("short"), "{why}");
 }
 
 /// What stands between two texts, each time.

@@ -85,7 +85,7 @@ mod tests {
     use super::outside;
     use crate::example::{Deviates, table};
 
-    /// Conditions of the table are within it; a speed of ten times the largest is outside, and is said so.
+    /// Conditions of the table are within it; a speed of ten times the largest is outside.
     #[test]
     fn a_speed_beyond_the_table_is_remarked() {
         let table = table(&mut Deviates(5), 0.0);

@@ -427,7 +427,7 @@ fn tell(summary: &Summary, json: bool) {
             stall.lasted.seconds() * 1e3
         );
     }
-    // A trip was told when it came.
+    // A trip has been printed when it came.
     if !matches!(summary.outcome, Outcome::Complete | Outcome::Stopped | Outcome::Tripped(_)) {
         report!("{}", summary.outcome.words());
         summary.remedy.iter().for_each(|remedy| report!("  {remedy}"));

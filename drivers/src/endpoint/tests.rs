@@ -247,7 +247,7 @@ fn a_fault_and_a_wrong_instrument_are_shown_with_what_was_read() {
     let frame = endpoint.profile().frame("state").unwrap();
     let stops = endpoint.profile().description.fault.iter().position(|f| f.severity == Severity::Stop);
     let fault = endpoint.profile().description.fault[stops.unwrap()].clone();
-    let mut sets = |endpoint: &mut Endpoint, counter: u16, faulty: bool| {
+    let sets = |endpoint: &mut Endpoint, counter: u16, faulty: bool| {
         let mut bytes = state(counter, false);
         let mut wanted = |signal: SignalId| {
             let named = endpoint.profile().description.signal[signal.0].name.as_ref();

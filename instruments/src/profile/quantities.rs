@@ -121,18 +121,18 @@ impl Compiler<'_> {
         });
         let wrong = |why: String| Err(self.at_name(&s.name, why));
         let mut lists = vec![["off", "on"].map(String::from).to_vec()];
-        if let Some(said) = &s.echo {
+        if let Some(named) = &s.echo {
             let Some(signal) = echo else {
-                return wrong(format!("the echo of set-point `{name}`, `{said}`, is not a signal"));
+                return wrong(format!("the echo of set-point `{name}`, `{named}`, is not a signal"));
             };
-            let found = self.description.signal.iter().find(|signal| signal.name.as_ref() == said);
+            let found = self.description.signal.iter().find(|signal| signal.name.as_ref() == named);
             if let Some(other) = found.map(|found| &found.si.unit).filter(|unit| **unit != s.si.unit) {
                 let unit = &s.si.unit;
-                let why = format!("set-point `{name}` is in `{unit}`, its echo `{said}` in `{other}`");
+                let why = format!("set-point `{name}` is in `{unit}`, its echo `{named}` in `{other}`");
                 return wrong(why);
             }
             if let Some(text::Form::Pattern(pattern)) = &frames[signal.frame.0].text
-                && let Some((_, Form::Words(words))) = pattern.fields().find(|(field, _)| field == said)
+                && let Some((_, Form::Words(words))) = pattern.fields().find(|(field, _)| field == named)
             {
                 lists.push(words.clone());
             }

@@ -42,7 +42,11 @@ pub fn remarks(passes: &[MeasuredPass]) -> Vec<String> {
     let rests = measured && !passes.iter().any(refers);
     let reversed = is_reversed(passes.iter().map(|p| &p.pass));
     let all = [(rests, NO_REFERENCE), (reversed, REVERSED)];
-    all.into_iter().filter(|(is, _)| *is).map(|(_, words)| words.to_string()).chain(load_missed(passes)).collect()
+    all.into_iter()
+        .filter(|(is, _)| *is)
+        .map(|(_, words)| words.to_string())
+        .chain(load_missed(passes))
+        .collect()
 }
 
 /// The remark of a run whose passes all had a fifth more, or all a fifth less, than the commanded load. SR-43
