@@ -57,9 +57,9 @@ pub struct Several {
     all: Vec<BadInput>,
 }
 
-/// The first three problems, and how many there are besides.
+/// The first problems, and how many there are besides.
 fn first_of(all: &[BadInput]) -> String {
-    let mut list: Vec<String> = all.iter().take(3).map(ToString::to_string).collect();
+    let mut list: Vec<String> = all.iter().take(8).map(ToString::to_string).collect();
     if all.len() > list.len() {
         list.push(format!("and {} more", all.len() - list.len()));
     }

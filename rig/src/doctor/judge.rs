@@ -163,7 +163,8 @@ fn instrument(found: &Found, look: &Look, target: &Target<'_>) -> Finding {
     }
     linked(answers, &mut problems);
     // Without its supply every amplifier that can shows a fault: it is not its own.
-    if !answers.fault.is_empty() && !(found.role == "amplifier" && look.supply_is_open()) {
+    let unsupplied = found.role == "amplifier" && look.supply_is_open();
+    if !answers.fault.is_empty() && !unsupplied {
         let advice = "look it up in its manual, and reset it at the instrument";
         problems.push((format!("it reports: {}", answers.fault), advice));
     }
