@@ -9,7 +9,7 @@
 use super::axis::{Axis, Past};
 use super::factor::{Factor, factor, factor_of};
 use super::form::{Form, Placement, Way};
-use super::ground::{Ground, grounds};
+use super::ground::{Ground, Under, grounds};
 use super::places::placed;
 use crate::evidence::Posterior;
 use crate::fit::Problem;
@@ -63,6 +63,8 @@ pub struct Shape {
     pub turns: bool,
     /// Log evidence over no gap's.
     pub nats: f64,
+    /// Log evidence without more scatter, which takes up what tells shapes apart.
+    alone: f64,
     /// Log evidence over that of no gap, with larger scatter where that is likelier.
     pub stands_out: f64,
     /// Place, or length of a period, with its 95 % interval, in the covariate's unit.
@@ -75,7 +77,7 @@ pub struct Shape {
 impl Shape {
     /// Nats by which shapes are ordered.
     fn order_nats(&self) -> f64 {
-        if self.kind == ShapeKind::Rough { ROUGH_SHARE * self.nats } else { self.nats }
+        if self.kind == ShapeKind::Rough { ROUGH_SHARE * self.alone } else { self.alone }
     }
 }
 
@@ -142,7 +144,11 @@ fn weighed(family: &Family, grounds: &[Ground], residual: &DVector<f64>, more: f
         let all: Vec<f64> = each.iter().map(|e| e.nats).collect();
         parts.push((ground.nats + log_sum_exp(&all) - count.ln(), each));
     }
-    let nats = log_sum_exp(&parts.iter().map(|p| p.0).collect::<Vec<_>>());
+    let over = |wanted: &dyn Fn(Under) -> bool| {
+        let all = parts.iter().zip(grounds).filter(|(_, ground)| wanted(ground.under));
+        log_sum_exp(&all.map(|(part, _)| part.0).collect::<Vec<_>>())
+    };
+    let nats = over(&|_| true);
     let under = (0..parts.len()).max_by(|&i, &j| parts[i].0.total_cmp(&parts[j].0)).unwrap_or(0);
     let best = parts[under].1.as_slice();
     let top = (0..best.len()).max_by(|&i, &j| best[i].nats.total_cmp(&best[j].nats)).unwrap_or(0);
@@ -168,6 +174,7 @@ fn weighed(family: &Family, grounds: &[Ground], residual: &DVector<f64>, more: f
         covariate: family.axis.covariate,
         turns: !matches!(family.way, Way::Reading(_)),
         nats,
+        alone: over(&|under| !matches!(under, Under::More(_))),
         stands_out: nats - more.max(0.0),
         at: (family.at[top], [0.5 * (low + below), 0.5 * (high + above)]),
         size: (size, [size - 1.96 * sd, size + 1.96 * sd]),
