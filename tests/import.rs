@@ -446,7 +446,7 @@ fn slipped_units_and_lost_signs_are_remarked_on() {
     assert!(unsigned.contains("friction_force in place of lateral_force"), "{unsigned}");
     assert_eq!(remarks("magnitudes.csv", ["um", "Hz", "friction_force:N"], true), "[]");
     let turned = remarks("turned.csv", ["um", "Hz", "lateral_force:-N"], false);
-    assert!(turned.contains("friction pushes along the sliding in the passes without vibration"), "{turned}");
+    assert!(turned.contains("friction pushes along the sliding: the lateral axis is reversed"), "{turned}");
 }
 
 /// A record of strokes to and fro, each with a step of velocity within: a pass a stretch, in every one the

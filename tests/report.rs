@@ -45,7 +45,7 @@ fn a_run_without_references_says_that_its_mu_rests_on_the_model() {
             assert_eq!(text.contains(remark), remarked, "{}", run.join(file).display());
         }
     }
-    // The load that the loop commanded stands beside the one that was measured.
+    // The load that the loop commanded is beside the one that was measured.
     let passes = std::fs::read_to_string(out.join("passes.jsonl")).unwrap();
     let has_load = |line: &str| line.contains("\"commanded_normal_force_n\":0.25");
     assert!(passes.lines().all(has_load), "{passes}");

@@ -1,5 +1,6 @@
-//! What an unknown departure looks like: a jump, bump, period, resonance, rough function, memory or
-//! trend, with its place, size and odds; and which causes are sure though others act beside them. docs/diagnosis/model.md, section 10.
+//! What an unknown departure looks like: a jump, bump, period, resonance, rough function, memory or trend,
+//! with its place, size and odds; and which causes are sure though others act beside them.
+//! docs/diagnosis/model.md, section 10.
 
 use crate::decision::{Decision, Verdict};
 use crate::fitted::Fitted;

@@ -114,7 +114,7 @@ fn misses(fitted: &Fitted, table: &Table, rig: &RigFile, answer: &Answer, out: &
         let mut ratios: Vec<f64> = forecasts.iter().zip(out).filter_map(error).collect();
         ratios.sort_by(f64::total_cmp);
         let place = ((ratios.len() as f64 + 1.0) * HELD).ceil() as usize;
-        ratios.get(place.min(ratios.len()).wrapping_sub(1)).map_or(0.0, |ratio| ratio / DEVIATIONS)
+        ratios.get(place - 1).or(ratios.last()).map_or(0.0, |ratio| ratio / DEVIATIONS)
     };
     // Of a force that is hardly above the scatter a share says nothing.
     let large = |f: &Forecast| Some(f.corrected.abs()).filter(|force| *force > LARGE * f.scatter_sd);

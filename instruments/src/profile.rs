@@ -129,7 +129,7 @@ pub(crate) struct CompiledSignal {
 }
 
 impl CompiledSignal {
-    /// Whether what stands in the frame is a whole number.
+    /// Whether the frame has a whole number for it.
     fn has_counts(&self) -> bool {
         match &self.place {
             Place::Bytes(Field { bits: None, number: NumberType::F32 | NumberType::F64, .. }) => false,

@@ -102,8 +102,8 @@ impl Pass {
 }
 
 /// What to do about a lateral axis that points the other way.
-pub const REVERSED: &str = "friction pushes along the sliding in the passes without vibration: the lateral axis is reversed. Set \
-    `gain = -1` for `lateral` in [[force]] of the setup, or turn the sensor; in a table turn the signs of lateral_force_n";
+pub const REVERSED: &str = "friction pushes along the sliding: the lateral axis is reversed. Set `gain = -1` for \
+    `lateral` in [[force]] of the setup, or turn the sensor; in a table turn the signs of lateral_force_n";
 /// Share of passes from which on the sign of friction is that of the axis, not of the scatter.
 const OF_ONE_SIGN: f64 = 0.95;
 

@@ -39,6 +39,7 @@ pub use grid::Grid;
 pub(crate) use grid::csv_of;
 pub use log::{Log, MappedColumn};
 pub use map::guessed_lines;
+pub(crate) use remarks::points;
 pub use remarks::{Range, of_table as remarks_of};
 pub use series::{Counts, Cut};
 pub use text::Marks;

@@ -1,6 +1,6 @@
 //! From a table and the rig.toml beside it to a verdict, its page, and the files in a run's folder.
 
-use crate::import::remarks_of;
+use crate::import::{points, remarks_of};
 use crate::law::Loaded;
 use crate::passes::parse_passes;
 use calibration::certificate::sha256_hex;
@@ -17,9 +17,6 @@ use runs::run_dir::{damage_in, is_held, record_facts};
 use runs::verdict::{add_record, files};
 use std::path::{Path, PathBuf};
 use std::sync::Arc;
-
-/// Most points that a remark lists.
-const LISTED: usize = 8;
 
 /// The point table of `data`, a table or a run's folder, and the rig.toml: `rig`, or the one beside it.
 pub fn inputs(data: &Path, rig: Option<PathBuf>) -> (PathBuf, PathBuf) {
@@ -69,23 +66,14 @@ impl Subject {
         let options = Options { law: self.law.clone(), ..options };
         let mut result = diagnose(&self.table, &self.rig, &options, self.sha256.clone());
         run.map_or(Ok(()), |run| add_record(&mut result, run, &self.rig))?;
-        result.report.remarks.extend(self.unused());
+        let lack = points(&self.passes, |p| p.lateral_force_n.is_none());
+        let unused = |(count, points)| {
+            let all = self.passes.len();
+            format!("Not used, because lateral_force_n is empty: point {points} ({count} of {all} passes).")
+        };
+        result.report.remarks.extend(lack.map(unused));
         result.report.remarks.extend(remarks_of(&self.passes));
         Ok(result)
-    }
-
-    /// Says which passes have no lateral force.
-    fn unused(&self) -> Option<String> {
-        let without = self.passes.iter().filter(|p| p.lateral_force_n.is_none());
-        let points: Vec<String> = without.map(|p| p.point.to_string()).collect();
-        let shown = points[..points.len().min(LISTED)].join(", ");
-        let more = if points.len() > LISTED { ", ..." } else { "" };
-        (!points.is_empty()).then(|| {
-            format!(
-                "Without lateral_force_n, and so not used: {} passes (points {shown}{more}).",
-                points.len()
-            )
-        })
     }
 
     /// The page of a verdict on a run's folder.
@@ -122,4 +110,31 @@ pub fn diagnose_run(run: &Path) -> miette::Result<()> {
     let subject = subject.into_diagnostic().wrap_err_with(|| path.display().to_string())?;
     let result = subject.diagnose(Options::default(), Some(run))?;
     files::write(run, &result, &subject.rig, &subject.page_of_run(&result, run)?, &damage_in(run)?)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use models::condition::Condition;
+    use models::quantity::Direction;
+
+    /// A pass without a force, and a unit that has slipped, are remarked on with the verdict, not by `check` alone.
+    #[test]
+    fn what_is_wrong_with_a_table_is_remarked_on_with_its_verdict() {
+        let pass = |k: u64| {
+            let direction = if k.is_multiple_of(2) { Direction::Forward } else { Direction::Backward };
+            let force = direction.sign() * (0.1 + 0.001 * (k % 7) as f64);
+            let at = Condition { speed_m_s: 20.0, direction, time_s: k as f64, ..Condition::paper() };
+            Pass::at(k, &at, (k != 7).then_some(force))
+        };
+        let rig = "[finger]\nnormal_stiffness_n_per_m = 3.9e6\nlateral_stiffness_n_per_m = 1.5e6\n\
+                   stiffness_relative_sd = 0.05\npoisson_ratio = 0.33\n\
+                   [noise]\npass_relative_sd = 0.02\nforce_sd_n = 0.001\n";
+        let passes: Vec<Pass> = (0..24).map(pass).collect();
+        let subject = Subject::of(passes, b"", RigFile::parse(rig).unwrap()).unwrap();
+        let options = Options { pairs: false, ..Options::default() };
+        let remarks = subject.diagnose(options, None).unwrap().report.remarks.join("\n");
+        assert!(remarks.contains("lateral_force_n is empty: point 7 (1 of 24 passes)"), "{remarks}");
+        assert!(remarks.contains("speed_m_s: 20000 mm/s is a thousand times too large"), "{remarks}");
+    }
 }

@@ -69,7 +69,7 @@ fn slip(value: f64, [low, high]: [f64; 2]) -> Option<&'static str> {
 }
 
 /// The first points of those passes, and how many more there are; `None` of none.
-fn points(passes: &[Pass], is: impl Fn(&Pass) -> bool) -> Option<(usize, String)> {
+pub(crate) fn points(passes: &[Pass], is: impl Fn(&Pass) -> bool) -> Option<(usize, String)> {
     let all: Vec<String> = passes.iter().filter(|p| is(p)).map(|p| p.point.to_string()).collect();
     let more = if all.len() > 5 { ", ..." } else { "" };
     (!all.is_empty()).then(|| (all.len(), format!("{}{more}", all[..all.len().min(5)].join(", "))))
