@@ -110,15 +110,6 @@ impl Field {
         })
     }
 
-    /// What stands in the frame, as a whole number: of floating-point numbers the bits, of the others the value.
-    // whole numbers of 32 bits are exact
-    pub fn counts(&self, frame: &[u8]) -> Option<i64> {
-        match self.number {
-            NumberType::F32 | NumberType::F64 => self.word(frame).map(|word| word as i64),
-            _ => self.read(frame).map(|number| number as i64),
-        }
-    }
-
     /// Stores `value`, rounded to the nearest and limited to the type's range, as an instrument's converter
     /// does. Other bits of the same word stay unchanged. A value that is not a number is stored as one only
     /// in floating point; integers take zero. Returns `false` where the frame is too short.

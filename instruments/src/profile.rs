@@ -81,18 +81,6 @@ impl Place {
         }
     }
 
-    fn counts(&self, frame: &[u8]) -> Option<i64> {
-        match self {
-            Place::Bytes(field) => field.counts(frame),
-            // of floating-point numbers the bits; of the others the counts, which the file's offset shifts
-            Place::Dbc(at, signal) if signal.float => signal.raw(frame.get(*at..)?),
-            Place::Dbc(at, signal) => {
-                signal.read(frame.get(*at..)?).map(|value| (value / signal.factor).round() as i64)
-            }
-            Place::Computed(_) => None,
-        }
-    }
-
     fn write(&self, frame: &mut [u8], value: f64) -> bool {
         match self {
             Place::Bytes(field) => field.write(frame, value),
@@ -110,6 +98,9 @@ impl Place {
         }
     }
 }
+
+/// One count of a number that has none: far below any resolution, and up to 9e6 of the unit in 64 bits.
+const COUNT_OF_A_FLOAT: f64 = 1e-12;
 
 /// One signal, compiled.
 #[derive(Debug, Clone)]
@@ -283,25 +274,20 @@ impl Profile {
         }
     }
 
-    /// What the instrument sent for a signal, in its own counts; for `f32` the bits of the number.
-    /// Zero where the frame is too short. A signal that is worked out is given in its own smallest steps
-    /// ([`Profile::lsb_si`]).
+    /// What the instrument sent for a signal, in its own counts. Of a floating-point number, of one in a line
+    /// of text and of a signal that is worked out a count is 1e-12 of its unit: no certificate depends on the
+    /// resolution that a profile states. Zero where the frame is too short.
     pub fn raw(&self, signal: SignalId, frame: &[u8], values: &Values) -> i64 {
-        match &self.signals[signal.0].place {
-            // saturates, and NaN gives zero
-            Place::Computed(_) => (self.si(signal, values) / self.lsb_si(signal, values)).round() as i64,
-            place => place.counts(frame).unwrap_or(0),
-        }
-    }
-
-    /// Whether [`Profile::raw`] is a number of steps of the signal: a float has no counts.
-    pub fn has_counts(&self, signal: SignalId) -> bool {
-        let signal = &self.signals[signal.0];
-        let inputs = || self.inputs(signal.frame).into_iter().all(|i| self.signals[i].has_counts());
-        match signal.place {
-            Place::Computed(_) => signal.resolution_si.is_some() || inputs(),
-            _ => signal.has_counts(),
-        }
+        let compiled = &self.signals[signal.0];
+        let (number, count) = match &compiled.place {
+            Place::Computed(_) => (values.get(signal), COUNT_OF_A_FLOAT),
+            place if !compiled.has_counts() => (place.read(frame).unwrap_or(0.0), COUNT_OF_A_FLOAT),
+            // The file's offset shifts the counts.
+            Place::Dbc(_, dbc) => (compiled.place.read(frame).unwrap_or(0.0), dbc.factor),
+            place => (place.read(frame).unwrap_or(0.0), 1.0),
+        };
+        // saturates, and NaN gives zero
+        (number / count).round() as i64
     }
 
     /// Gives the set-point of that name, or else the signal, another way to SI: a certificate's.

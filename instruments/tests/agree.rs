@@ -86,15 +86,23 @@ fn units_and_factors_agree() {
     assert!(why.contains("1 mN is 1e-3 N"), "{why}");
 }
 
-/// A float's bits are no counts; neither are those of a number in a line of text.
+/// The bits of a float are no counts, for a certificate of force over them is wrong and looks good. Its
+/// counts, and those of a computed signal, do not depend on the resolution that the profile states.
 #[test]
-fn what_has_counts() {
-    let counts = |text: &str, signal: &str| {
-        let profile = Profile::parse_with(text, &|_| Some(DBC.to_string())).unwrap();
-        profile.has_counts(profile.signal(signal).unwrap())
-    };
-    assert!(counts(FORCE, "lateral") && counts(CAN, "lateral"));
-    assert!(!counts(WORDS, "echo_amplitude"));
-    assert!(!counts(include_str!("../../docs/profiles/strain-amp.toml"), "lateral"));
-    assert!(counts(include_str!("../../drivers/profiles/ati-digital-ft.toml"), "fx"));
+fn a_certificate_can_rest_on_the_counts_of_every_signal() {
+    const FLOATS: &str = include_str!("../../docs/profiles/strain-amp.toml");
+    const TWICE: &str = "[[signal]]\nname = \"twice\"\nvalue = \"2 * lateral\"\nunit = \"N\"\n\
+        si = { factor = 1.0, unit = \"N\" }\nresolution_si = 2e-4\n[[signature]]";
+    let text = FLOATS.replacen("[[signature]]", TWICE, 1);
+    for text in [text.clone(), text.replace("2e-4", "5e-3")] {
+        let profile = Profile::parse(&text).unwrap();
+        let [lateral, twice] = ["lateral", "twice"].map(|name| profile.signal(name).unwrap());
+        let frame = profile.frame_of(lateral);
+        let (mut bytes, mut values) = (vec![0; profile.frame_bytes(frame)], profile.values());
+        for (sent, counts) in [(0.125, 125_000_000_000), (-2.5, -2_500_000_000_000), (0.0, 0)] {
+            profile.encode(frame, &mut bytes, &mut |id| (id == lateral).then_some(sent));
+            profile.decode(frame, &bytes, &mut values).unwrap();
+            assert_eq!([lateral, twice].map(|id| profile.raw(id, &bytes, &values)), [counts, 2 * counts]);
+        }
+    }
 }

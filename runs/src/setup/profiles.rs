@@ -108,21 +108,6 @@ impl SetupFile {
         })
     }
 
-    /// Whether the signals of force have counts, which a certificate of force turns into newtons.
-    ///
-    /// # Errors
-    /// The signal that has none, and what to do without a certificate.
-    pub fn has_counts(&self) -> Result<(), String> {
-        let float = self.axes().find(|axis| !axis.profile.has_counts(axis.signal));
-        float.map_or(Ok(()), |axis| {
-            Err(format!(
-                "signal {} is a float and has no counts, which a force certificate needs: name a signal of whole \
-                 numbers, or correct the axis by its `gain` and `offset_n`",
-                axis.shown()
-            ))
-        })
-    }
-
     /// Its instruments, each with the table in which it stands; the chamber, which takes no part in the loop,
     /// is none of them.
     pub fn by_table(&self) -> Vec<(&'static str, &InstrumentSetup)> {
@@ -521,17 +506,5 @@ mod tests {
         let why = status.has_both_axes().unwrap_err().to_string();
         assert!(why.contains("`fault`") && why.contains("not in N"), "{why}");
         with("force2", "lateral = { signal = \"lateral\", gain = -1.0 }").unwrap().has_both_axes().unwrap();
-    }
-
-    /// The bits of a float grow with it: a certificate of force over them is wrong, and looks good.
-    #[test]
-    fn a_float_has_no_counts_for_a_certificate() {
-        let folder = Path::new(env!("CARGO_MANIFEST_DIR")).join("../docs/profiles");
-        let text = Setup::load("virtual-ideal").unwrap().text;
-        let floats = text.replacen("muprime-force2", "strain-amp.toml", 1);
-        let floats = Setup::parse("floats", &floats, &folder).unwrap();
-        let why = floats.file.has_counts().unwrap_err();
-        assert!(why.contains("`lateral` of `strain-amp`") && why.contains("`gain`"), "{why}");
-        Setup::load("virtual-ideal").unwrap().file.has_counts().unwrap();
     }
 }

@@ -1,5 +1,6 @@
-//! Calibrations over real protocols: the virtual rig behind Modbus TCP and behind CAN (slcan on a pseudo-terminal), with
-//! gains, cross-talk, offset, lag and amplitude scale withheld, weighed and looked at as an operator would.
+//! Calibrations over real protocols: the virtual rig behind Modbus TCP (whole numbers, then floats) and
+//! behind CAN (slcan on a pseudo-terminal), with gains, cross-talk, offset, lag and amplitude scale withheld, weighed
+//! and looked at as an operator would.
 //!
 //! Each is one shot in wall-clock time, which no seed repeats. So the bound is stated beforehand and wider than the 95 %
 //! whose coverage the trials judge: the truth within four standard uncertainties, for the delay one-sided as well the
@@ -207,9 +208,11 @@ fn weigh(folder: &Path, served: &mut Served, setup: &str, draw: &mut Noise) -> s
 
 #[test]
 fn dead_weights_over_modbus_and_can_find_what_was_withheld() {
-    // The muprime instrument's registers count 10 uN, the ATI's CAN frames 0.5 mN (their profiles' scales).
+    // The muprime instrument's registers count 10 uN, the ATI's CAN frames 0.5 mN (their profiles' scales); a
+    // count of a float is 1e-12 of its unit.
     for (bus, setup, profile, counts_per_n, more) in [
         ("modbus-tcp", "virtual-ideal", "muprime-force2", 1e5, vec![]),
+        ("floats", "virtual-ideal", "strain-amp", 1e12, vec![]),
         ("slcan", "virtual-slcan", "ati-netft-can", 2e3, vec!["--can", "slcan:pty"]),
     ] {
         let folder = tempfile::tempdir().unwrap();
@@ -217,8 +220,13 @@ fn dead_weights_over_modbus_and_can_find_what_was_withheld() {
         let mut draw = Noise::new(20_261_122, bus);
         let withheld = Withheld::draw(&mut draw);
         std::fs::write(at.join("withheld.toml"), withheld.toml()).unwrap();
-        let mut served = Served::start(at, setup, &more);
-        let text = std::fs::read_to_string(tests::file(&format!("runs/setups/{setup}.toml"))).unwrap();
+        let mut text = std::fs::read_to_string(tests::file(&format!("runs/setups/{setup}.toml"))).unwrap();
+        if bus == "floats" {
+            std::fs::copy(tests::file("docs/profiles/strain-amp.toml"), at.join("strain-amp.toml")).unwrap();
+            text = text.replacen("muprime-force2", "strain-amp.toml", 1);
+        }
+        std::fs::write(at.join("served.toml"), &text).unwrap();
+        let mut served = Served::start(at, "served.toml", &more);
         // A rig like any other: not `[virtual]`, at the addresses that were given out.
         let (force, tcp) = (served.address(profile), served.address("muprime-stage"));
         let text = text
