@@ -18,6 +18,8 @@ const LEAST_KEPT: usize = 10;
 const LEAST_DRAWS: usize = 20;
 /// Squared errors of a pass: under four models, of repeatability, and the part of it that passes have in common.
 const ERRORS: usize = 6;
+/// Error of the recalibrated baseline, as a multiple of the nominal one's, above which a remark says so.
+const MISLED: f64 = 1.05;
 /// Quantiles of a 95 % interval.
 const CI95: [f64; 2] = [0.025, 0.975];
 
@@ -51,6 +53,23 @@ impl Gap {
         let turned = |[low, high]: [f64; 2]| if share < 0.0 { [-high, -low] } else { [low, high] };
         let interval = self.shrinkage_ci95.map(|ends| turned(ends).map(|end| 100.0 * end));
         Some((if share < 0.0 { "grows" } else { "shrinks" }, 100.0 * share.abs(), interval))
+    }
+
+    /// Says that recalibration alone, from which the shrinkage counts, is worse than no recalibration.
+    pub fn remark(&self) -> Option<String> {
+        let times = self.recalibrated_rmse? / self.before_rmse?;
+        self.shrinkage.filter(|_| times > MISLED)?;
+        let above = |rmse: f64| Some((rmse.powi(2) - self.noise_floor_rmse?.powi(2)).max(0.0).sqrt());
+        let share = 1.0 - above(self.after_rmse?)? / above(self.before_rmse?)?;
+        let nominal = if share.is_finite() {
+            format!("Counted from the nominal model, it shrinks by {:.0} %.", 100.0 * share)
+        } else {
+            "The nominal model has no gap there.".to_string()
+        };
+        Some(format!(
+            "On passes that were held out, the recalibrated model is {times:.2} times as far off as the nominal one: \
+             its stiffnesses took up part of the gap. {nominal}"
+        ))
     }
 }
 
@@ -180,6 +199,7 @@ fn refits(folds: usize) -> f64 {
 
 #[cfg(test)]
 mod tests {
+    use super::Gap;
     use crate::decision::Verdict;
     use crate::example::{Deviates, rig, runs};
     use crate::hypotheses::Options;
@@ -199,5 +219,26 @@ mod tests {
         let gap = &report.gap;
         assert!(gap.recalibrated_rmse > gap.noise_floor_rmse, "{gap:?}");
         assert_eq!((gap.shrinkage, gap.shrinkage_ci95, gap.unexplained_share), (None, None, None), "{gap:?}");
+    }
+
+    /// The shrinkage counts from the recalibrated baseline, also where that is the worse one: then it is said.
+    #[test]
+    fn a_recalibration_that_is_worse_than_none_is_remarked_on() {
+        let gap = |recalibrated: f64| Gap {
+            unit: "mu_relative",
+            before_rmse: Some(0.05),
+            recalibrated_rmse: Some(recalibrated),
+            after_rmse: Some(0.02),
+            form_alone_rmse: None,
+            noise_floor_rmse: Some(0.01),
+            shrinkage: Some(0.7),
+            shrinkage_ci95: None,
+            unexplained_share: None,
+        };
+        let remark = gap(0.066).remark().unwrap();
+        // 1 - sqrt((0.02^2 - 0.01^2) / (0.05^2 - 0.01^2))
+        assert!(remark.contains("1.32 times") && remark.contains("shrinks by 65 %"), "{remark}");
+        assert_eq!(gap(0.049).remark(), None);
+        assert_eq!(Gap { shrinkage: None, ..gap(0.066) }.remark(), None);
     }
 }

@@ -213,6 +213,7 @@ pub fn diagnose(table: &Table, rig: &RigFile, options: &Options, sha256: String)
         Verdict::Unknown => Vec::new(),
     };
     let seen_from = if decision.verdict == Verdict::NoGap { seen_from(&fitted) } else { Vec::new() };
+    remarks.extend(gap.remark());
     remarks.extend(crate::power::remark(&seen_from));
     remarks.extend(stiffness_pulls.iter().filter_map(Pull::remark));
     let psi_reading = crate::reading::of_table(table, rig, &fitted.scatter);
