@@ -2,11 +2,14 @@
 //!
 //! `MUPRIME_UPDATE=1 cargo test --release -p muprime-tests --test words` writes docs/reference.md anew.
 
+#[path = "words/reference.rs"]
+mod reference;
+
 use rayon::prelude::*;
+use reference::{objects, page};
 use serde_json::Value;
 use std::collections::BTreeSet;
 use tables::schemas::bundled;
-use tables::schemas::reference::{objects, page};
 use tables::schemas::schema::Kind;
 use tests::{documents, file, muprime, texts};
 

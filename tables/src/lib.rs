@@ -6,7 +6,7 @@
 //! | [`export`] | a run's passes and record in the formats of other programs |
 //! | [`law`] | a friction law by name or from a file; a law that was tabulated |
 //! | [`passes`] | a point table from its bytes, CSV or Parquet |
-//! | [`schemas`] | schemas from the types, the reference of all keys, commented beginnings, what is bundled |
+//! | [`schemas`] | schemas from the types, commented beginnings, what is bundled |
 //! | [`verdict`] | the verdict on a table or a run, from its files to those that it is written into |
 //! | [`check`] | what is wrong with any file, and whether a plan can run on a setup |
 

@@ -1,9 +1,9 @@
 //! `docs/reference.md`: every key of every kind of file, from the schemas.
 
-use super::schema::Kind;
-use crate::import::targets::{ColumnKind as Cell, TARGETS};
 use serde_json::Value;
 use std::fmt::Write;
+use tables::import::targets::{ColumnKind as Cell, TARGETS};
+use tables::schemas::schema::Kind;
 
 /// The page.
 pub fn page() -> String {
