@@ -49,15 +49,12 @@ pub(super) fn journal(path: &Path) -> miette::Result<Option<usize>> {
     let text = String::from_utf8(bytes_of(path, MAX_TABLE_BYTES)?).into_diagnostic()?;
     let sessions = path.file_name().is_some_and(|n| n == "sessions.jsonl");
     for (i, line) in text.lines().enumerate() {
-        let read = if sessions {
-            serde_json::from_str::<runs::run_dir::Session>(line).map(drop)
+        let (what, read) = if sessions {
+            ("session", serde_json::from_str::<runs::run_dir::Session>(line).map(drop))
         } else {
-            serde_json::from_str::<runs::sequence::MeasuredPass>(line).map(drop)
+            ("pass", serde_json::from_str::<runs::sequence::MeasuredPass>(line).map(drop))
         };
-        read.map_err(|e| {
-            let what = if sessions { "session" } else { "pass" };
-            miette::miette!("{}: line {}: no {what}: {e}", path.display(), i + 1)
-        })?;
+        read.map_err(|e| miette::miette!("{}: line {}: no {what}: {e}", path.display(), i + 1))?;
     }
     Ok((!sessions).then(|| text.lines().count()))
 }

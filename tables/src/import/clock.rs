@@ -3,8 +3,10 @@
 use super::grid::{Cell, Grid};
 use super::targets::Id;
 use super::values::Values;
+use calibration::certificate::date;
 
-const DAY_S: f64 = 86_400.0;
+/// A day, by which workbooks count time, in s.
+pub const DAY_S: f64 = 86_400.0;
 
 /// A time as it is written.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -74,7 +76,7 @@ fn written(cell: &Cell, month_first: Option<bool>) -> Option<Reading> {
     Some(Reading { seconds, dated: date.is_some(), two })
 }
 
-/// Days from some day of a date: `2024-03-01`, `01.03.2024`, `01-Mar-2024`; of one with slashes if it is
+/// Days of a date from 1970: `2024-03-01`, `01.03.2024`, `01-Mar-2024`; of one with slashes if it is
 /// known whether it begins with the month.
 fn days(date: &str, month_first: Option<bool>) -> Option<f64> {
     const MONTHS: [&str; 12] =
@@ -82,7 +84,7 @@ fn days(date: &str, month_first: Option<bool>) -> Option<f64> {
     let mark = date.chars().find(|c| ".-/".contains(*c))?;
     let parts: Vec<&str> = date.split(mark).collect();
     let &[first, second, third] = &parts[..] else { return None };
-    let named = MONTHS.iter().position(|m| second.eq_ignore_ascii_case(m)).map(|k| k as i64 + 1);
+    let named = MONTHS.iter().position(|m| second.eq_ignore_ascii_case(m)).map(|k| k + 1);
     // A year of two digits might be a day.
     let (y, m, d) = match (mark, first.len(), third.len()) {
         ('-' | '/', 4, _) => (first, second, third),
@@ -92,15 +94,8 @@ fn days(date: &str, month_first: Option<bool>) -> Option<f64> {
         ('/', _, 4) => (third, second, first),
         _ => return None,
     };
-    let (y, m, d) = (y.parse::<i64>().ok()?, named.or_else(|| m.parse().ok())?, d.parse::<i64>().ok()?);
-    if !(0..=9999).contains(&y) || !(1..=12).contains(&m) || !(1..=31).contains(&d) {
-        return None;
-    }
-    // Days of the civil calendar (proleptic Gregorian), the year beginning in March.
-    let (y, m) = if m > 2 { (y, m - 3) } else { (y - 1, m + 9) };
-    let days = 365 * y + y.div_euclid(4) - y.div_euclid(100) + y.div_euclid(400) + (153 * m + 2) / 5 + d;
-    // From 1970 on, so that the seconds keep their decimals.
-    Some((days - 719_469) as f64)
+    let (y, m, d) = (y.parse::<usize>().ok()?, named.or_else(|| m.parse().ok())?, d.parse::<usize>().ok()?);
+    Some(date::parse(&format!("{y:04}-{m:02}-{d:02}"))? as f64 / DAY_S)
 }
 
 /// The dates beside times of a day, row by row, and the column that has them.
@@ -255,6 +250,8 @@ mod tests {
             "01.03 10:00:00",
             "01-03-24 10:00:00",
             "01-03-2024 10:00:00",
+            "30.02.2024 10:00:00",
+            "2023-02-29 10:00:00",
         ] {
             assert_eq!(at(ambiguous), None, "{ambiguous}");
         }

@@ -220,22 +220,17 @@ impl Values {
         let mut condition = Condition::paper();
         condition.amplitude = PeakToPeak::from_metres(amplitude);
         for (covariate, value) in [
-            (&covariate::TIME, need("time_s", self.get(Id::Time))?),
-            (&covariate::FREQUENCY, frequency),
-            (&covariate::SPEED, need("speed_m_s", self.speed())?),
-            (&covariate::DIRECTION, direction),
-            (&covariate::POSITION, self.get(Id::Position).unwrap_or(0.0)),
-            (&covariate::NORMAL_FORCE, need("normal_force_n", self.get(Id::NormalForce))?),
+            (&covariate::TIME, Some(need("time_s", self.get(Id::Time))?)),
+            (&covariate::FREQUENCY, Some(frequency)),
+            (&covariate::SPEED, Some(need("speed_m_s", self.speed())?)),
+            (&covariate::DIRECTION, Some(direction)),
+            (&covariate::POSITION, self.get(Id::Position).or(Some(0.0))),
+            (&covariate::NORMAL_FORCE, Some(need("normal_force_n", self.get(Id::NormalForce))?)),
+            (&covariate::AMBIENT_PRESSURE, self.get(Id::Pressure)),
+            (&covariate::TEMPERATURE, self.get(Id::Temperature)),
+            (&covariate::RELATIVE_HUMIDITY, self.get(Id::Humidity)),
         ] {
-            covariate.put(&mut condition, value);
-        }
-        let air = [
-            (&covariate::AMBIENT_PRESSURE, Id::Pressure),
-            (&covariate::TEMPERATURE, Id::Temperature),
-            (&covariate::RELATIVE_HUMIDITY, Id::Humidity),
-        ];
-        for (covariate, id) in air {
-            if let Some(value) = self.get(id) {
+            if let Some(value) = value {
                 covariate.put(&mut condition, value);
             }
         }

@@ -1,5 +1,6 @@
 //! Workbooks: Excel and OpenDocument. Their cells are taken one by one, so that a sheet costs what is in it, not what it spans.
 
+use super::clock::DAY_S;
 use super::grid::{Cell, Grid, Row};
 use super::head::Source;
 use super::units::Unit;
@@ -9,9 +10,6 @@ use std::collections::BTreeMap;
 mod unfolded;
 
 use unfolded::{Part, looked_through};
-
-/// Days, as workbooks count time, in s.
-const DAY_S: f64 = 86_400.0;
 
 /// A sheet of a workbook: Excel or OpenDocument.
 ///

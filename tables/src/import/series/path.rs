@@ -14,10 +14,9 @@ const MOVING: f64 = 0.1;
 
 /// The sums of the first values, from none to all of them.
 pub fn sums(values: impl Iterator<Item = f64>) -> Vec<f64> {
-    let mut sum = 0.0;
-    let further = values.map(|value| {
-        sum += value;
-        sum
+    let further = values.scan(0.0, |sum, value| {
+        *sum += value;
+        Some(*sum)
     });
     std::iter::once(0.0).chain(further).collect()
 }
@@ -79,20 +78,17 @@ pub fn at_rests(times: &[f64], path: &[f64], from: usize, to: usize) -> Vec<(usi
         moves = v.abs() > if moves { 0.2 * MOVING } else { MOVING } * fastest;
         moves
     });
-    pieces(moving, from).map(|(_, piece)| piece).collect()
+    pieces(moving, from).into_iter().map(|(_, piece)| piece).collect()
 }
 
 /// Samples from number `from` on in a row of one state: that state, and the range.
-pub fn pieces(
-    states: impl Iterator<Item = bool>,
-    from: usize,
-) -> impl Iterator<Item = (bool, (usize, usize))> {
+pub fn pieces(states: impl Iterator<Item = bool>, from: usize) -> Vec<(bool, (usize, usize))> {
     let (states, mut end): (Vec<bool>, _) = (states.collect(), from);
     let piece = |run: &[bool]| {
         end += run.len();
         (run[0], (end - run.len(), end))
     };
-    states.chunk_by(|a, b| a == b).map(piece).collect::<Vec<_>>().into_iter()
+    states.chunk_by(|a, b| a == b).map(piece).collect()
 }
 
 /// Velocity of every sample of a leg, and the half window that it took: from `least` on, the window is

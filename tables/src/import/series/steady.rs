@@ -30,7 +30,8 @@ pub fn steady(samples: &[Values], slopes: &[f64], h: usize, from: usize, still: 
         let moves = slopes[k].abs() > still && places[4] - places[0] <= STEADY * slopes[k].abs();
         moves && tracks.iter().all(same)
     };
-    pieces((0..n).map(is_steady), from).filter_map(|(steady, piece)| steady.then_some(piece)).collect()
+    let pieces = pieces((0..n).map(is_steady), from).into_iter();
+    pieces.filter_map(|(steady, piece)| steady.then_some(piece)).collect()
 }
 
 /// One pass of a stretch: means, and the speed as the slope of the path.

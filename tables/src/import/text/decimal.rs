@@ -15,9 +15,7 @@ pub fn ungroup(rows: &mut [Row], decimal: Option<char>) {
         let mark = *marks.iter().find(|mark| text.contains(**mark))?;
         let (whole, behind) =
             text.split_at(text.find(|c| ",.".contains(c) && c != mark).unwrap_or(text.len()));
-        let mut groups = whole.trim_start_matches(['-', '+']).split(mark);
-        let head = groups.next().filter(|head| (1..=3).contains(&head.len()) && !head.starts_with('0'));
-        let grouped = head.is_some() && groups.all(|group| group.len() == 3) && !behind.contains(mark);
+        let grouped = grouped(whole, mark) && !behind.contains(mark);
         Some(text.replace(mark, "")).filter(|bare| grouped && is_number(bare))
     };
     for cell in rows.iter_mut().flat_map(|row| &mut row.cells) {
@@ -27,6 +25,14 @@ pub fn ungroup(rows: &mut [Row], decimal: Option<char>) {
             *text = bare;
         }
     }
+}
+
+/// Whether the mark may separate thousands: three digits behind each, and one to three before them without a
+/// zero at the beginning.
+fn grouped(number: &str, mark: char) -> bool {
+    let mut groups = number.trim_start_matches(['-', '+']).split(mark);
+    let head = groups.next().is_some_and(|head| (1..=3).contains(&head.len()) && !head.starts_with('0'));
+    head && groups.all(|group| group.len() == 3 && group.bytes().all(|b| b.is_ascii_digit()))
 }
 
 /// Whether the decimal mark is a comma: one stands where a point would, and no number has a point.
@@ -67,20 +73,11 @@ fn refuse_thousands(rows: &[Row], mark: char) -> miette::Result<()> {
             _ => None,
         });
         let (marked, whole): (Vec<_>, Vec<_>) = texts.partition(|(_, text)| text.contains(mark));
-        let grouped = |text: &str| {
-            text.split_once(mark).is_some_and(|(head, tail)| {
-                let head = head.trim_start_matches(['-', '+']);
-                (1..=3).contains(&head.len())
-                    && !head.starts_with('0')
-                    && tail.len() == 3
-                    && tail.bytes().all(|b| b.is_ascii_digit())
-            })
-        };
         let size = |text: &str| Unit::SI.apply(&text.replace(mark, ".")).map_or(0.0, f64::abs);
         let largest = whole.iter().map(|(_, t)| size(t)).fold(0.0, f64::max);
         let smallest = marked.iter().map(|(_, t)| size(t)).fold(f64::INFINITY, f64::min);
         let Some((line, first)) = marked.first() else { continue };
-        let all = marked.iter().all(|(_, t)| grouped(t));
+        let all = marked.iter().all(|(_, t)| grouped(t, mark));
         // As decimals they are further from the whole numbers than as thousands.
         if all && largest < 1000.0 && largest * largest > 1000.0 * smallest * smallest {
             miette::bail!(

@@ -96,7 +96,7 @@ fn marks_of_thousands_are_read_where_nothing_else_can_be_meant() {
     }
     let grouped = read("a;b\n1.234.567;2\n1,5;3\n", Some(',')).unwrap();
     assert_eq!(numbers(&grouped)[0][0], 1_234_567.0);
-    for number in ["12.34,5", "1'23.5", "1.2345,5"] {
+    for number in ["12.34,5", "1'23.5", "1.2345,5", "1'1e5"] {
         let found = read(&format!("a;b\n{number};2\n1;3\n"), Some(',')).unwrap();
         assert!(numbers(&found)[0][0].is_nan(), "{number}");
     }

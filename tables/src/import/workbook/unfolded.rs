@@ -28,51 +28,30 @@ impl Looked {
 /// memory for that.
 pub(super) fn looked_through(bytes: &[u8]) -> miette::Result<Looked> {
     use std::io::Read;
-    let number = |at: usize, n: usize| -> Option<usize> {
-        Some(bytes.get(at..at + n)?.iter().rev().fold(0, |all, b| all << 8 | usize::from(*b)))
-    };
     let mut left = 48 * bytes.len() + (16 << 20);
     let mut found = Looked::default();
-    // The directory stands at the end (PKWARE, APPNOTE 4.3.12): each entry names where its data begin.
-    let from = bytes.len().saturating_sub(65_557);
-    let Some(end) = bytes[from..].windows(4).rposition(|w| w == b"PK\x05\x06").map(|at| from + at) else {
-        return Ok(found);
-    };
-    let mut at = number(end + 16, 4).unwrap_or(0);
+    // What is not packed does not unfold.
+    let Ok(mut archive) = zip::ZipArchive::new(std::io::Cursor::new(bytes)) else { return Ok(found) };
     let mut buffer = vec![0; 1 << 16];
-    while bytes.get(at..).is_some_and(|rest| rest.starts_with(b"PK\x01\x02")) {
-        let (Some(method), Some(packed), Some(local)) =
-            (number(at + 10, 2), number(at + 20, 4), number(at + 42, 4))
-        else {
-            break;
-        };
-        let start = local + 30 + number(local + 26, 2).unwrap_or(0) + number(local + 28, 2).unwrap_or(0);
-        if method == 8 || method == 0 {
-            let data = bytes.get(start..).unwrap_or_default();
-            let data = &data[..packed.min(data.len())];
-            let mut unfolded: Box<dyn Read> =
-                if method == 8 { Box::new(flate2::read::DeflateDecoder::new(data)) } else { Box::new(data) };
-            let name = at + 46..at + 46 + number(at + 28, 2).unwrap_or(0);
-            let sheet = String::from_utf8_lossy(bytes.get(name).unwrap_or_default()).into_owned();
-            let mut repeated = Repeats { found, sheet, ..Repeats::default() };
-            while let Ok(n) = unfolded.read(&mut buffer) {
-                if n == 0 {
-                    break;
-                }
-                repeated.look(&buffer[..n]);
-                left = left.saturating_sub(n);
-                if left == 0 || repeated.cells > crate::import::most_cells(bytes.len()) {
-                    miette::bail!(
-                        help = "save the sheet as CSV",
-                        "the workbook unfolds to far more than its {} bytes: it is damaged, or almost all of it is empty",
-                        bytes.len()
-                    );
-                }
+    for index in 0..archive.len() {
+        let Ok(mut unfolded) = archive.by_index(index) else { continue };
+        let sheet = unfolded.name().unwrap_or_default().into_owned();
+        let mut repeated = Repeats { found, sheet, ..Repeats::default() };
+        while let Ok(n) = unfolded.read(&mut buffer) {
+            if n == 0 {
+                break;
             }
-            found = repeated.found;
+            repeated.look(&buffer[..n]);
+            left = left.saturating_sub(n);
+            if left == 0 || repeated.cells > crate::import::most_cells(bytes.len()) {
+                miette::bail!(
+                    help = "save the sheet as CSV",
+                    "the workbook unfolds to far more than its {} bytes: it is damaged, or almost all of it is empty",
+                    bytes.len()
+                );
+            }
         }
-        let lengths = [28, 30, 32].map(|k| number(at + k, 2).unwrap_or(0));
-        at += 46 + lengths.iter().sum::<usize>();
+        found = repeated.found;
     }
     Ok(found)
 }
