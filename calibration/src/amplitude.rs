@@ -2,7 +2,7 @@
 //!
 //! | module | purpose |
 //! |---|---|
-//! | [`vibrometer`] | waveform to amplitude and phase, with the vibrometer's own range and delay |
+//! | [`vibrometer`] | range and delay of a vibrometer's decoder; waveform to amplitude |
 //! | [`gain`] | set-point (or current) to amplitude |
 //! | [`resonance`] | resonance and quality factor from a sweep |
 //! | [`map`] | amplitude over position: the mode shape |

@@ -146,7 +146,9 @@ impl Parts {
 
     /// A finding whose interval comes from a profile of the likelihood.
     fn profiled(&mut self, name: &'static str, unit: &'static str, value: f64, ci95: [f64; 2], dof: f64) {
-        self.findings.push(Finding::new(name, unit, [value, half_width_sd(ci95)], dof.max(1.0)));
+        // It is not symmetric; the certificate's standard uncertainty is that of its half-width.
+        let sd = 0.5 * (ci95[1] - ci95[0]) / 1.96;
+        self.findings.push(Finding::new(name, unit, [value, sd], dof.max(1.0)));
         self.ends.push(Ends::Both(ci95));
     }
 
@@ -265,9 +267,4 @@ enum Ends {
 /// An end of a profile interval, in words.
 fn end(value: f64, closed: bool) -> String {
     format!("{value:.3e}{}", if closed { "" } else { " (end of the range searched)" })
-}
-
-/// A profile interval is not symmetric; the certificate's standard uncertainty is that of its half-width.
-fn half_width_sd(ci95: [f64; 2]) -> f64 {
-    0.5 * (ci95[1] - ci95[0]) / 1.96
 }

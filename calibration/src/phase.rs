@@ -71,7 +71,7 @@ mod tests {
     fn the_mean_goes_round_the_circle() {
         let shifts: Vec<Shift> = [358.0, 2.0, 0.0, 1.0, 359.0]
             .iter()
-            .map(|p| Shift { phase_deg: *p, subharmonic_share: 0.0, period_doubled: false, separated: true })
+            .map(|p| Shift { phase_deg: *p, period_doubled: false })
             .collect();
         let found = repeated(&shifts, 27_500.0, 0.0).unwrap();
         assert!(found.phase_deg.value < 1e-9 || found.phase_deg.value > 360.0 - 1e-9);

@@ -11,7 +11,7 @@ use models::condition::Condition;
 use models::covariate::{Covariate, Role, SMOOTH, TIME};
 use nalgebra::DMatrix;
 
-/// Correlation length over the starts of runs, in standard deviations of time.
+/// Correlation length over the starts of runs, in standard deviations of time; each run is apart.
 const RUN_LENGTH: f64 = 0.02;
 
 /// What a cause's function replaces.
@@ -69,7 +69,8 @@ impl Kernels {
         let bends = effects.iter().filter_map(|&effect| Some((effect, effects::at(effect).acts?)));
         let bends = bends.flat_map(|(effect, acts)| {
             let over = (false, bend_lengths(k, acts.over));
-            let runs = acts.by_run().then(|| (true, run_lengths(k)));
+            let runs =
+                acts.by_run().then(|| (true, Lengths { time: RUN_LENGTH, ..bend_lengths(k, &[&TIME]) }));
             [Some(over), runs].into_iter().flatten().map(move |(by_run, lengths)| (effect, by_run, lengths))
         });
         let bends = bends.map(|(effect, by_run, lengths)| {
@@ -130,21 +131,11 @@ pub(crate) fn beside_each_other(first: &DMatrix<f64>, other: &DMatrix<f64>) -> D
     all
 }
 
-/// Over the starts of the runs, so short that each run is apart.
-fn run_lengths(k: &Constants) -> Lengths {
-    Lengths { time: RUN_LENGTH, ..bend_lengths(k, &[&TIME]) }
-}
-
 /// Over the weather, and over the place too, as smooth as a departure from form.
 fn size_lengths(k: &Constants, place: bool) -> Lengths {
     let (far, climate) = (f64::INFINITY, k.form_length);
     let position = if place { climate } else { far };
     Lengths { condition: far, time: far, position, climate, seen: [true; COUNT] }
-}
-
-/// A linear map of the readings: what is linear in its size departs from no form.
-fn is_linear_map(effect: usize) -> bool {
-    effects::at(effect).departs_by < 1.0
 }
 
 /// Whether the size of an effect may go with the place: not where another effect of the library is that.
@@ -190,7 +181,8 @@ impl Basis {
     pub(crate) fn of(&self, effect: usize, bends: Bends) -> Option<&DMatrix<f64>> {
         match bends {
             Bends::Input => self.bends.iter().find(|(e, _)| *e == effect).map(|(_, basis)| basis),
-            Bends::Size if is_linear_map(effect) => None,
+            // A linear map of the readings: what is linear in its size departs from no form.
+            Bends::Size if effects::at(effect).departs_by < 1.0 => None,
             Bends::Size => self.sizes[usize::from(goes_with_place(effect))].as_ref(),
         }
     }

@@ -75,16 +75,13 @@ macro_rules! constants {
                 },)*)*]
             }
 
-            fn replace(&mut self, name: &str, numbers: &mut dyn Iterator<Item = f64>) -> Option<bool> {
+            /// Whether there is such a constant that can have these numbers; it then has them.
+            fn replace(&mut self, name: &str, numbers: &mut dyn Iterator<Item = f64>) -> bool {
                 match name {
-                    $($(stringify!($name) => Some(match Value::from_numbers(numbers) {
-                        Some(value) => {
-                            self.$name = value;
-                            true
-                        }
-                        None => false,
-                    }),)*)*
-                    _ => None,
+                    $($(stringify!($name) => {
+                        Value::from_numbers(numbers).map(|value| self.$name = value).is_some()
+                    })*)*
+                    _ => false,
                 }
             }
         }
@@ -242,10 +239,7 @@ impl Constants {
         if given.len() != needed || given.iter().any(|v| v.is_nan()) {
             return Err(refused());
         }
-        match self.replace(name, &mut given.into_iter()) {
-            Some(true) => Ok(()),
-            _ => Err(refused()),
-        }
+        if self.replace(name, &mut given.into_iter()) { Ok(()) } else { Err(refused()) }
     }
 
     /// Multiplies a constant, all of its numbers alike; whole numbers are rounded and stay one at least.

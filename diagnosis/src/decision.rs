@@ -364,8 +364,8 @@ fn says_as_much(fitted: &Fitted, pair: usize, gap: f64) -> Vec<usize> {
 #[cfg(test)]
 mod tests {
     use super::Verdict;
-    use crate::example::{Deviates, rig, table};
     use crate::hypotheses::Options;
+    use crate::tests::{Deviates, rig, table};
     use crate::verdict::diagnose;
     use models::quantity::PeakToPeak;
 

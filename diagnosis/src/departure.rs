@@ -83,7 +83,7 @@ impl Change {
             let Some(slope) = slope(problem, members, u, prediction, (i, freedom.bends)) else { continue };
             let own = match members.len() {
                 1 => raw.clone(),
-                _ => prediction - without(problem, members, u, i),
+                _ => prediction - without_member(problem, members, u, i),
             };
             let own = beside_recalibration(problem, &jacobian, &own);
             let unit = norm(problem, &beside_recalibration(problem, &jacobian, &slope));
@@ -165,7 +165,13 @@ fn slope(
     })
 }
 
-fn without(problem: &Problem, members: &[Member], u: &[f64], member: usize) -> DVector<f64> {
+/// Forces of a hypothesis at coordinates, N, with one of its members left out.
+pub(crate) fn without_member(
+    problem: &Problem,
+    members: &[Member],
+    u: &[f64],
+    member: usize,
+) -> DVector<f64> {
     let (mut rest, mut v) = (members.to_vec(), u.to_vec());
     rest.remove(member);
     v.drain(Layout::of(members).member(member));
@@ -173,7 +179,12 @@ fn without(problem: &Problem, members: &[Member], u: &[f64], member: usize) -> D
 }
 
 fn norm(problem: &Problem, force: &DVector<f64>) -> f64 {
-    force.iter().zip(&problem.variance).map(|(x, v)| x * x / v).sum::<f64>().sqrt()
+    product(problem, force, force).sqrt()
+}
+
+/// Inner product of two forces in deviations of a pass.
+pub(crate) fn product(problem: &Problem, a: &DVector<f64>, b: &DVector<f64>) -> f64 {
+    a.iter().zip(b.iter()).zip(&problem.variance).map(|((a, b), v)| a * b / v).sum()
 }
 
 /// The transpose of a matrix whose rows are divided by these variances.
@@ -196,8 +207,8 @@ mod tests {
     use crate::bases::Kernels;
     use crate::data::Table;
     use crate::evidence::{averaged_over_form, laplace};
-    use crate::example::{Deviates, rig, table};
     use crate::least_squares::minimise;
+    use crate::tests::{Deviates, rig, table};
     use effects::{Baseline, by_name};
     use models::condition::Condition;
 
@@ -254,7 +265,7 @@ mod tests {
         use models::covariate::{SPEED, TIME};
         assert!(bent.change.bends_over(&TIME) && !bent.change.bends_over(&SPEED));
         assert!(!alone.change.bends_over(&TIME));
-        let (_, best) = averaged_over_form(&problem, &fit, &members, &basis);
+        let (_, best) = averaged_over_form(&problem, &fit.u, &members, &basis);
         assert!(best.freedom.bend > 0.0 && best.by_law().freedom.bend == 0.0);
         // The verdict says that the law is not this.
         let report = crate::verdict::diagnose(&table, &rig(), &Default::default(), String::new()).report;

@@ -1,7 +1,7 @@
 //! The verdict as a document: the JSON of `muprime diagnose --json`, and its predictions.
 
 use crate::certificates::{AtFault, InDoubt, at_fault, in_doubt};
-use crate::data::Table;
+use crate::data::{self, Table};
 use crate::describe::three_digits;
 use crate::unstated::Unstated;
 use crate::verdict::{Diagnosis, Report};
@@ -61,8 +61,8 @@ const BEYOND: f64 = 0.1;
 /// Says which settings of the conditions lie outside those of the table: nothing was seen there.
 pub fn outside(table: &Table, conditions: &Table) -> Option<String> {
     let range = |c: &Covariate, of: &Table| {
-        let seen = of.passes.iter().filter_map(|p| c.of(p));
-        seen.fold(None, |r: Option<[f64; 2]>, v| Some(r.map_or([v, v], |[a, b]| [a.min(v), b.max(v)])))
+        let [low, high] = data::range(of.passes.iter().filter_map(|p| c.of(p)));
+        (low <= high).then_some([low, high])
     };
     let beyond = COVARIATES.iter().filter(|c| c.role != Role::Time).filter_map(|c| {
         let ([low, high], [least, most]) = (range(c, table)?, range(c, conditions)?);
@@ -83,7 +83,7 @@ pub fn outside(table: &Table, conditions: &Table) -> Option<String> {
 #[cfg(test)]
 mod tests {
     use super::outside;
-    use crate::example::{Deviates, table};
+    use crate::tests::{Deviates, table};
 
     /// Conditions of the table are within it; a speed of ten times the largest is outside.
     #[test]

@@ -10,7 +10,7 @@ use crate::departure::{Change, Freedom};
 use crate::fit::{Member, Problem};
 use crate::gaussian::{Covariance, HALF_LN_2PI, log_sum_exp};
 use crate::layout::{Layout, NUISANCES};
-use crate::least_squares::{Fit, bounded_step, carry};
+use crate::least_squares::{bounded_step, carry};
 use effects::Prior;
 use nalgebra::{DMatrix, DVector};
 use statrs::function::erf::erfc;
@@ -224,22 +224,22 @@ pub fn middle_freedom(k: &Constants, members: &[Member]) -> Freedom {
     Freedom::share(k.form_shares[1].min(largest_share(members)))
 }
 
-/// Evidence of a hypothesis averaged over its freedoms, with the best one's solution.
+/// Evidence of a hypothesis averaged over its freedoms, with the best one's solution, sought from `start`.
 pub fn averaged_over_form(
     problem: &Problem,
-    fit: &Fit,
+    start: &[f64],
     members: &[Member],
     basis: &Basis,
 ) -> (f64, Posterior) {
     if members.is_empty() {
-        let e = laplace(problem, members, &fit.u, basis, Freedom::NONE, MODE_ROUNDS[0]);
+        let e = laplace(problem, members, start, basis, Freedom::NONE, MODE_ROUNDS[0]);
         return (e.log_evidence, e);
     }
     let most = largest_share(members);
     let k = &problem.constants;
     let [small, medium, large] = k.form_shares;
     let [first, second, third] = MODE_ROUNDS;
-    let middle = laplace(problem, members, &fit.u, basis, middle_freedom(k, members), second);
+    let middle = laplace(problem, members, start, basis, middle_freedom(k, members), second);
     let from = |freedom: Freedom, rounds: usize| laplace(problem, members, &middle.u, basis, freedom, rounds);
     let [one, two, three, four, five] = k.form_weights;
     let mut list = vec![(from(Freedom::share(small), first), one)];
@@ -272,8 +272,8 @@ pub fn averaged_over_form(
 mod tests {
     use super::*;
     use crate::bases::Kernels;
-    use crate::example::{Deviates, rig, table};
     use crate::least_squares::minimise;
+    use crate::tests::{Deviates, rig, table};
 
     /// Without a gap a law can gain no more than its best size does: at size zero its shapes change nothing,
     /// and a volume that nothing limits must not count for it.

@@ -358,7 +358,7 @@ impl Problem {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::example::{Deviates, rig, table};
+    use crate::tests::{Deviates, rig, table};
     use models::rig_file::RigFile;
 
     /// Whatever certificate rig.toml may state reaches the prior of the law that it bounds.

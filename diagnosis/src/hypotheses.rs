@@ -29,7 +29,7 @@ use crate::pairs::pairs;
 use crate::progress::Progress;
 use crate::scatter::{Belief, Scatter};
 use crate::singles::{SINGLES_END, Search, lapsed, singles, sort, unlisted};
-use crate::starts::{nuisances_of, tempered};
+use crate::starts::tempered;
 use crate::structure::{shapes, structure};
 use effects::{Effect, library, one_cause};
 use models::condition::Condition;
@@ -96,10 +96,10 @@ pub fn fit_believing(table: &Table, rig: &RigFile, options: &Options, belief: &B
 
     let baseline = minimise(&problem, &[], &[0.0; NUISANCES], &problem.variance, ROUNDS[0]);
     let basis = Basis::none(problem.len());
-    let (none_evidence, none) = averaged_over_form(&problem, &baseline, &[], &basis);
+    let (none_evidence, none) = averaged_over_form(&problem, &baseline.u, &[], &basis);
     let gap = &discrepancy.smooth - &none.prediction;
     let loose = tempered(&problem, &gap, k.start_share);
-    let nuisances = nuisances_of(&minimise(&problem, &[], &none.u, &loose, ROUNDS[1]));
+    let nuisances = minimise(&problem, &[], &none.u, &loose, ROUNDS[1]).u;
 
     let mut not_testable = Vec::new();
     let mut tried = Vec::new();
@@ -108,12 +108,10 @@ pub fn fit_believing(table: &Table, rig: &RigFile, options: &Options, belief: &B
         if options.without.iter().any(|n| n == effect.name) {
             continue;
         }
-        match table.lacks(effect.needs) {
-            Some(because) => not_testable.push((effect.name, certified(effect, rig).unwrap_or(because))),
-            None => match beyond(&problem, table, effect) {
-                Some(because) => not_testable.push((effect.name, because)),
-                None => tried.push(index),
-            },
+        let lacks = table.lacks(effect.needs).map(|because| certified(effect, rig).unwrap_or(because));
+        match lacks.or_else(|| beyond(&problem, table, effect)) {
+            Some(because) => not_testable.push((effect.name, because)),
+            None => tried.push(index),
         }
     }
 
@@ -243,7 +241,7 @@ fn sought_again(problem: &Problem, singles: &mut [Candidate], pairs: &[Candidate
         })
         .map(|(member, u)| {
             let fit = minimise(problem, &[member], &u, search.loose, ROUNDS[1]);
-            averaged_over_form(problem, &fit, &[member], search.basis)
+            averaged_over_form(problem, &fit.u, &[member], search.basis)
         })
         .collect();
     for (evidence, found) in again {

@@ -48,11 +48,12 @@ const NORMAL_95: f64 = 1.96;
 /// Profiles every parameter of the hypothesis.
 pub fn estimates(problem: &Problem, best: &Posterior, basis: &Basis) -> Vec<Vec<Estimate>> {
     let covariance = problem.covariance(&best.change.columns(basis, best.freedom.share));
-    let floor = cost(problem, best, &covariance, &best.u, &best.prediction);
     let precision = problem.prior_precision(&best.members);
+    let profiles = Profiles { problem, best, covariance, precision: &precision };
+    let floor = profiles.cost(&best.u, &best.prediction);
     let one = |(p, k): (Parameter, usize)| {
         let bounds = p.coordinate_bounds();
-        let [low, high] = [-1.0, 1.0].map(|side| end(problem, best, &covariance, floor, k, side, bounds));
+        let [low, high] = [-1.0, 1.0].map(|side| profiles.end(floor, k, side, bounds));
         let shape = match (low, high) {
             _ if assumed(problem, best, &precision, k) => Shape::Prior,
             (Some(_), Some(_)) => Shape::Bounded,
@@ -99,97 +100,93 @@ fn assumed(problem: &Problem, e: &Posterior, precision: &[f64], k: usize) -> boo
     1.0 - e.covariance[(k, k)] * precision[k] < problem.constants.least_contraction
 }
 
-fn cost(problem: &Problem, best: &Posterior, c: &Covariance, u: &[f64], m: &DVector<f64>) -> f64 {
-    let precision = problem.prior_precision(&best.members);
-    let y = DVector::from_column_slice(&problem.lateral);
-    c.quadratic(&(y - m)) + u.iter().zip(&precision).map(|(x, p)| p * x * x).sum::<f64>()
+/// A hypothesis whose coordinates are profiled.
+struct Profiles<'a> {
+    problem: &'a Problem,
+    best: &'a Posterior,
+    covariance: Covariance,
+    precision: &'a [f64],
 }
 
-/// The coordinate at which the profile has fallen by [`FALL`]; `None` where it never does within the bounds.
-fn end(
-    problem: &Problem,
-    best: &Posterior,
-    covariance: &Covariance,
-    floor: f64,
-    k: usize,
-    side: f64,
-    bounds: (f64, f64),
-) -> Option<f64> {
-    let sd = best.covariance[(k, k)].max(1e-16).sqrt();
-    let limit = if side < 0.0 { best.u[k] - bounds.0 } else { bounds.1 - best.u[k] };
-    if limit <= 0.0 {
-        return None;
+impl Profiles<'_> {
+    fn cost(&self, u: &[f64], m: &DVector<f64>) -> f64 {
+        let y = DVector::from_column_slice(&self.problem.lateral);
+        self.covariance.quadratic(&(y - m))
+            + u.iter().zip(self.precision).map(|(x, p)| p * x * x).sum::<f64>()
     }
-    let mut start = best.u.clone();
-    let mut fall = |distance: f64| -> f64 {
-        let (u, value) = profile(problem, best, covariance, &start, k, best.u[k] + side * distance);
-        start = u;
-        value - floor
-    };
-    let (mut near, mut far) = (0.0, (NORMAL_95 * sd).min(limit));
-    let mut value = fall(far);
-    while value < FALL {
-        if far >= limit {
+
+    /// The coordinate at which the profile has fallen by [`FALL`]; `None` where it never does within bounds.
+    fn end(&self, floor: f64, k: usize, side: f64, bounds: (f64, f64)) -> Option<f64> {
+        let best = self.best;
+        let sd = best.covariance[(k, k)].max(1e-16).sqrt();
+        let limit = if side < 0.0 { best.u[k] - bounds.0 } else { bounds.1 - best.u[k] };
+        if limit <= 0.0 {
             return None;
         }
-        near = far;
-        far = (far * 1.7 + 1e-6).min(limit);
-        value = fall(far);
-    }
-    let mut at_far = value.sqrt();
-    let mut at_near = if near == 0.0 { 0.0 } else { fall(near).max(0.0).sqrt() };
-    let goal = FALL.sqrt();
-    // The root of the fall is nearly straight: a few secants suffice.
-    let mut x = far;
-    for _ in 0..4 {
-        x = near + (far - near) * (goal - at_near) / (at_far - at_near).max(1e-9);
-        let root = fall(x).max(0.0).sqrt();
-        if (root - goal).abs() < 0.02 {
-            break;
-        }
-        if root > goal {
-            (far, at_far) = (x, root);
-        } else {
-            (near, at_near) = (x, root);
-        }
-    }
-    Some(best.u[k] + side * x)
-}
-
-/// Best cost with one coordinate fixed, by Gauss-Newton in the others.
-fn profile(
-    problem: &Problem,
-    best: &Posterior,
-    covariance: &Covariance,
-    start: &[f64],
-    k: usize,
-    value_at: f64,
-) -> (Vec<f64>, f64) {
-    let precision = problem.prior_precision(&best.members);
-    let mut bounds = problem.bounds(&best.members);
-    bounds[k] = (value_at, value_at);
-    let mut u = start.to_vec();
-    u[k] = value_at;
-    let y = DVector::from_column_slice(&problem.lateral);
-    let mut m = problem.predict(&best.members, &u);
-    let mut value = cost(problem, best, covariance, &u, &m);
-    for _ in 0..4 {
-        let mut jacobian = problem.jacobian(&best.members, &u, &m);
-        jacobian.column_mut(k).fill(0.0);
-        let (mut hessian, gradient) = equations(covariance, &jacobian, &(&y - &m), &precision, &u);
-        // What a uniform prior does not bound stays finite.
-        (0..u.len()).filter(|i| precision[*i] == 0.0).for_each(|i| hessian[(i, i)] += 1e-9);
-        let Some(mut next) = bounded_step(&hessian, &gradient, 1e-6, &u, &bounds) else { break };
-        next[k] = value_at;
-        let there = problem.predict(&best.members, &next);
-        let v = cost(problem, best, covariance, &next, &there);
-        if v >= value - 1e-3 {
-            if v < value {
-                (u, value) = (next, v);
+        let mut start = best.u.clone();
+        let mut fall = |distance: f64| -> f64 {
+            let (u, value) = self.profile(&start, k, best.u[k] + side * distance);
+            start = u;
+            value - floor
+        };
+        let (mut near, mut far) = (0.0, (NORMAL_95 * sd).min(limit));
+        let mut value = fall(far);
+        while value < FALL {
+            if far >= limit {
+                return None;
             }
-            break;
+            near = far;
+            far = (far * 1.7 + 1e-6).min(limit);
+            value = fall(far);
         }
-        (u, m, value) = (next, there, v);
+        let mut at_far = value.sqrt();
+        let mut at_near = if near == 0.0 { 0.0 } else { fall(near).max(0.0).sqrt() };
+        let goal = FALL.sqrt();
+        // The root of the fall is nearly straight: a few secants suffice.
+        let mut x = far;
+        for _ in 0..4 {
+            x = near + (far - near) * (goal - at_near) / (at_far - at_near).max(1e-9);
+            let root = fall(x).max(0.0).sqrt();
+            if (root - goal).abs() < 0.02 {
+                break;
+            }
+            if root > goal {
+                (far, at_far) = (x, root);
+            } else {
+                (near, at_near) = (x, root);
+            }
+        }
+        Some(best.u[k] + side * x)
     }
-    (u, value)
+
+    /// Best cost with one coordinate fixed, by Gauss-Newton in the others.
+    fn profile(&self, start: &[f64], k: usize, value_at: f64) -> (Vec<f64>, f64) {
+        let Profiles { problem, best, covariance, precision } = self;
+        let mut bounds = problem.bounds(&best.members);
+        bounds[k] = (value_at, value_at);
+        let mut u = start.to_vec();
+        u[k] = value_at;
+        let y = DVector::from_column_slice(&problem.lateral);
+        let mut m = problem.predict(&best.members, &u);
+        let mut value = self.cost(&u, &m);
+        for _ in 0..4 {
+            let mut jacobian = problem.jacobian(&best.members, &u, &m);
+            jacobian.column_mut(k).fill(0.0);
+            let (mut hessian, gradient) = equations(covariance, &jacobian, &(&y - &m), precision, &u);
+            // What a uniform prior does not bound stays finite.
+            (0..u.len()).filter(|i| precision[*i] == 0.0).for_each(|i| hessian[(i, i)] += 1e-9);
+            let Some(mut next) = bounded_step(&hessian, &gradient, 1e-6, &u, &bounds) else { break };
+            next[k] = value_at;
+            let there = problem.predict(&best.members, &next);
+            let v = self.cost(&next, &there);
+            if v >= value - 1e-3 {
+                if v < value {
+                    (u, value) = (next, v);
+                }
+                break;
+            }
+            (u, m, value) = (next, there, v);
+        }
+        (u, value)
+    }
 }

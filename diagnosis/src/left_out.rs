@@ -1,12 +1,11 @@
 //! The gap left in regions that the fit did not see. docs/diagnosis/model.md, section 9, steps 2 and 3.
 
 use crate::constants::Constants;
-use crate::departure::Freedom;
+use crate::departure::{Freedom, product, without_member};
 use crate::evidence::{Posterior, laplace};
 use crate::fit::{Member, Problem};
 use crate::fitted::Fitted;
-use crate::gaussian::Covariance;
-use crate::layout::Layout;
+use crate::gaussian::{Covariance, rows_times};
 use crate::least_squares::{Fit, minimise};
 use crate::recalibration::Recalibration;
 use models::condition::Condition;
@@ -73,6 +72,9 @@ pub fn regions(problem: &Problem) -> Vec<Part> {
     let p = &problem.passes;
     let mut list: Vec<Part> = Vec::new();
     let k = &problem.constants;
+    let fits = |rows: &[usize], most: f64| {
+        rows.len() >= k.region_least && rows.len() as f64 <= most * n as f64 + ROUNDING
+    };
     let ends = |over: &'static Covariate, name: &str, of: &[usize], list: &mut Vec<Part>| {
         let value = |i: usize| over.of(&p[i]).unwrap_or(f64::NAN);
         let mut sorted: Vec<f64> = of.iter().map(|&i| value(i)).collect();
@@ -85,7 +87,7 @@ pub fn regions(problem: &Problem) -> Vec<Part> {
         let below: Vec<usize> = of.iter().copied().filter(|&i| value(i) <= low).collect();
         let above: Vec<usize> = of.iter().copied().filter(|&i| value(i) >= high).collect();
         for (word, rows) in [("low", below), ("high", above)] {
-            if rows.len() >= k.region_least && rows.len() as f64 <= k.region_most * n as f64 + ROUNDING {
+            if fits(&rows, k.region_most) {
                 list.push(Part { name: format!("{word} {name}"), over, rows });
             }
         }
@@ -102,8 +104,7 @@ pub fn regions(problem: &Problem) -> Vec<Part> {
         for f in frequencies {
             let rows: Vec<usize> =
                 (0..n).filter(|&i| (p[i].frequency_hz / f - 1.0).abs() < ONE_FREQUENCY).collect();
-            if rows.len() >= k.region_least && rows.len() as f64 <= k.region_most_level * n as f64 + ROUNDING
-            {
+            if fits(&rows, k.region_most_level) {
                 list.push(Part { name: format!("{f:.0} Hz"), over: &FREQUENCY, rows });
             }
         }
@@ -115,7 +116,7 @@ pub fn regions(problem: &Problem) -> Vec<Part> {
     if pressures.len() == n {
         let top = pressures.iter().copied().fold(0.0, f64::max);
         let rows: Vec<usize> = (0..n).filter(|&i| pressures[i] < k.low_pressure * top).collect();
-        if rows.len() >= k.region_least && rows.len() as f64 <= k.region_most_level * n as f64 + ROUNDING {
+        if fits(&rows, k.region_most_level) {
             list.push(Part { name: "low pressure".to_string(), over: &AMBIENT_PRESSURE, rows });
         }
     }
@@ -161,20 +162,14 @@ fn left_out_bent(
 /// unlisted that a free shape imitates would close by it.
 fn metric(rest: &Problem, out: &Problem, baseline: &Fit) -> Covariance {
     let whitened = |p: &Problem| {
-        let mut m = p.jacobian(&[], &baseline.u, &p.predict(&[], &baseline.u));
-        for (i, v) in p.variance.iter().enumerate() {
-            m.row_mut(i).scale_mut(1.0 / v.sqrt());
-        }
-        m
+        let inverse_sd = DVector::from_fn(p.len(), |i, _| 1.0 / p.variance[i].sqrt());
+        rows_times(p.jacobian(&[], &baseline.u, &p.predict(&[], &baseline.u)), &inverse_sd)
     };
     let (seen, left) = (whitened(rest), whitened(out));
     let precision = seen.transpose() * &seen + DMatrix::from_diagonal(&rest.prior_precision(&[]).into());
     let root = precision.cholesky().and_then(|c| c.l().solve_lower_triangular(&left.transpose()));
-    let mut open = root.map_or_else(|| DMatrix::zeros(out.len(), 0), |r| r.transpose());
-    for (i, v) in out.variance.iter().enumerate() {
-        open.row_mut(i).scale_mut(v.sqrt());
-    }
-    out.covariance(&open)
+    let open = root.map_or_else(|| DMatrix::zeros(out.len(), 0), |r| r.transpose());
+    out.covariance(&rows_times(open, &DVector::from_fn(out.len(), |i, _| out.variance[i].sqrt())))
 }
 
 /// Whether the rest of a table has one level of a covariate that has more in the whole, and what the cause
@@ -190,11 +185,9 @@ fn tells_nothing(problem: &Problem, rest: &Problem, best: &Posterior) -> bool {
     if !levels.into_iter().any(|value| one(rest, value) && !one(problem, value)) {
         return false;
     }
-    let chi2 = |p: &Problem, change: &DVector<f64>| -> f64 {
-        change.iter().zip(&p.variance).map(|(c, v)| c * c / v).sum()
-    };
     let there = Recalibration::of(rest, &best.u, &rest.predict(&best.members, &best.u)).net();
-    chi2(rest, &there) < problem.constants.informed_share * chi2(problem, &best.change.net)
+    let whole = product(problem, &best.change.net, &best.change.net);
+    product(rest, &there, &there) < problem.constants.informed_share * whole
 }
 
 /// All other rows.
@@ -211,13 +204,9 @@ fn own_changes(problem: &Problem, best: &Posterior) -> Vec<Vec<f64>> {
     if best.members.len() < 2 {
         return Vec::new();
     }
-    let layout = Layout::of(&best.members);
     (0..best.members.len())
         .map(|i| {
-            let (mut members, mut u) = (best.members.clone(), best.u.clone());
-            members.remove(i);
-            u.drain(layout.member(i));
-            let beside = problem.predict(&members, &u);
+            let beside = without_member(problem, &best.members, &best.u, i);
             let change = best.prediction.iter().zip(beside.iter()).zip(&problem.variance);
             change.map(|((with, without), v)| (with - without).powi(2) / v).collect()
         })
@@ -322,7 +311,7 @@ pub fn gate(k: &Constants, regions: &[Region]) -> Gate {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::example::{Deviates, rig, table};
+    use crate::tests::{Deviates, rig, table};
 
     /// Where true causes of a foreign form and mimics close as much, neither is ruled out; a cause that
     /// closes nothing is, and one that closes nearly all stays.

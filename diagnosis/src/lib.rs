@@ -58,8 +58,6 @@ pub mod discrepancy;
 pub mod document;
 mod draws;
 pub mod evidence;
-#[cfg(test)]
-mod example;
 pub mod fit;
 pub mod fitted;
 pub mod gaussian;
@@ -90,6 +88,8 @@ pub mod shrinkage;
 pub mod singles;
 pub mod starts;
 pub mod structure;
+#[cfg(test)]
+mod tests;
 pub mod timing;
 pub mod unstated;
 pub mod verdict;

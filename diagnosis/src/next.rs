@@ -99,7 +99,7 @@ fn designed(fitted: &Fitted, table: &Table, rig: &RigFile, decision: &Decision) 
     let empty = decision.unknown > 0.5 && fitted.unknown_probability < 0.5;
     let open = hypotheses.len() - 1;
     let chosen = design::greedy(&hypotheses, PASSES, empty.then_some(open), k.design_pass_nats);
-    let rival = design::rival(&hypotheses, &chosen)?;
+    let rival = design::rival(&hypotheses)?;
     let nats = design::expected_nats(&hypotheses[0], &hypotheses[rival], &chosen);
     let separates = [hypotheses[0].name.clone(), hypotheses[rival].name.clone()];
     let [leader, other] = separates.each_ref().map(|name| words(name));

@@ -123,8 +123,8 @@ fn misses(fitted: &Fitted, table: &Table, rig: &RigFile, answer: &Answer, out: &
 
 #[cfg(test)]
 mod tests {
-    use crate::example::{Deviates, rig, runs};
     use crate::hypotheses::Options;
+    use crate::tests::{Deviates, rig, runs};
     use crate::verdict::diagnose;
 
     /// Later passes of the same law, many of them of a few mN: what these scatter is no share of larger forces.

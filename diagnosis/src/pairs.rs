@@ -1,13 +1,12 @@
 //! Two causes at once: pairs grown from the best singles. docs/diagnosis/model.md, section 7.
 
 use crate::bases::Basis;
-use crate::departure::Freedom;
+use crate::departure::{Freedom, product};
 use crate::evidence::{Posterior, averaged_over_form, laplace, middle_freedom};
 use crate::fit::{Member, Problem};
 use crate::fitted::Candidate;
 use crate::layout::{Layout, NUISANCES};
-use crate::least_squares::Fit;
-use crate::starts::{coarse_scan, full_scan, nuisance_starts, refine_from};
+use crate::starts::{Hunt, nuisance_starts};
 use effects::one_cause;
 use rayon::prelude::*;
 use std::collections::BTreeSet;
@@ -26,28 +25,13 @@ struct Start {
 }
 
 impl Start {
-    fn effects(&self) -> Vec<usize> {
-        effects_of(&self.members)
-    }
-
     /// Best first; equal costs in the order of the library.
     fn sort(list: &mut [Start]) {
         list.sort_by(|a, b| a.cost.total_cmp(&b.cost).then(a.members.cmp(&b.members)));
     }
 }
 
-/// A pair with its posterior, and the effects that it joins.
-struct Pair {
-    effects: Vec<usize>,
-    posterior: Posterior,
-}
-
-impl Pair {
-    fn of(posterior: Posterior) -> Self {
-        Pair { effects: effects_of(&posterior.members), posterior }
-    }
-}
-
+/// The effects that members join, in the order of the library.
 fn effects_of(members: &[Member]) -> Vec<usize> {
     let mut effects: Vec<usize> = members.iter().map(|m| m.effect).collect();
     effects.sort_unstable();
@@ -60,9 +44,7 @@ fn one_change(problem: &Problem, a: &Posterior, b: &Posterior) -> bool {
     if one_cause(a.members[0].name(), b.members[0].name()) {
         return true;
     }
-    let product = |x: &Posterior, y: &Posterior| -> f64 {
-        x.change.net.iter().zip(y.change.net.iter()).zip(&problem.variance).map(|((p, q), v)| p * q / v).sum()
-    };
+    let product = |x: &Posterior, y: &Posterior| product(problem, &x.change.net, &y.change.net);
     product(a, b) > problem.constants.one_change_cosine * (product(a, a) * product(b, b)).sqrt().max(1e-300)
 }
 
@@ -70,16 +52,16 @@ fn one_change(problem: &Problem, a: &Posterior, b: &Posterior) -> bool {
 /// pair and not alone, and a pair in a local minimum loses to the open set.
 fn with_every_law(
     problem: &Problem,
-    mut pairs: Vec<Pair>,
+    mut pairs: Vec<Posterior>,
     singles: &[Candidate],
     loose: &[f64],
     basis: &Basis,
-) -> Vec<Pair> {
-    let evidence = |p: &Pair| p.posterior.log_evidence;
-    pairs.sort_by(|a, b| evidence(b).total_cmp(&evidence(a)).then(a.effects.cmp(&b.effects)));
-    let mut best: Vec<&Vec<usize>> = pairs.iter().map(|p| &p.effects).collect();
+) -> Vec<Posterior> {
+    let effects = |p: &Posterior| effects_of(&p.members);
+    pairs.sort_by(|a, b| b.log_evidence.total_cmp(&a.log_evidence).then_with(|| effects(a).cmp(&effects(b))));
+    let mut best: Vec<Vec<usize>> = pairs.iter().map(effects).collect();
     let mut seen = BTreeSet::new();
-    best.retain(|effects| seen.insert((*effects).clone()));
+    best.retain(|effects| seen.insert(effects.clone()));
     best.truncate(problem.constants.pairs_searched);
     let again: Vec<Posterior> = best
         .par_iter()
@@ -90,8 +72,9 @@ fn with_every_law(
                 .collect::<Vec<_>>()
         })
         .collect();
-    for found in again.into_iter().map(Pair::of) {
-        let better = |own: &&mut Pair| own.effects == found.effects && evidence(&found) > evidence(own);
+    for found in again {
+        let better =
+            |own: &&mut Posterior| effects(own) == effects(&found) && found.log_evidence > own.log_evidence;
         if let Some(own) = pairs.iter_mut().find(better) {
             *own = found;
         }
@@ -103,7 +86,7 @@ fn with_every_law(
 fn law_starts(
     problem: &Problem,
     effects: &[usize],
-    pairs: &[Pair],
+    pairs: &[Posterior],
     singles: &[Candidate],
     loose: &[f64],
 ) -> Vec<Start> {
@@ -113,8 +96,7 @@ fn law_starts(
     let (Some(strong), Some(weak)) = (both.next(), both.next()) else { return Vec::new() };
     let alone = strong.laws.iter().map(|(_, a)| (a.members[0], a.u.clone()));
     // And each member where the pair has it, beside the other.
-    let paired = pairs.iter().filter(|p| p.effects == effects).flat_map(|p| {
-        let x = &p.posterior;
+    let paired = pairs.iter().filter(|x| effects_of(&x.members) == effects).flat_map(|x| {
         let layout = Layout::of(&x.members);
         [0, 1].map(|i| (x.members[i], [&x.u[..NUISANCES], &x.u[layout.member(i)]].concat()))
     });
@@ -130,7 +112,7 @@ fn law_starts(
         .flat_map_iter(|(first, fixed, second)| {
             let members = vec![*first, *second];
             nuisance_starts(fixed, k.driven_sd).into_iter().filter_map(move |fixed| {
-                let (cost, u) = full_scan(problem, &members, &fixed, loose)?;
+                let (cost, u) = Hunt { problem, members: &members, variance: loose }.full_scan(&fixed)?;
                 Some(Start { cost, members: members.clone(), u })
             })
         })
@@ -150,7 +132,7 @@ fn law_starts(
 /// The mode of a pair from one start.
 fn refined(problem: &Problem, start: Start, loose: &[f64], basis: &Basis) -> Option<Posterior> {
     let members = &start.members;
-    let fit = refine_from(problem, members, start.u, loose)?;
+    let fit = Hunt { problem, members, variance: loose }.refine_from(start.u)?;
     let freedom = middle_freedom(&problem.constants, members);
     Some(laplace(problem, members, &fit.u, basis, freedom, ROUNDS[0]))
 }
@@ -178,7 +160,12 @@ fn twins(problem: &Problem, singles: &[Candidate], pair: &Posterior) -> Vec<(Vec
 
 /// Pairs of a bent leader: which second cause there is shows beside what the leader's function took up, and
 /// not beside its law alone.
-fn beside_a_function(problem: &Problem, singles: &[Candidate], loose: &[f64], basis: &Basis) -> Vec<Pair> {
+fn beside_a_function(
+    problem: &Problem,
+    singles: &[Candidate],
+    loose: &[f64],
+    basis: &Basis,
+) -> Vec<Posterior> {
     let k = &problem.constants;
     let leader = &singles[0].best;
     if leader.freedom.bend == 0.0 {
@@ -190,9 +177,10 @@ fn beside_a_function(problem: &Problem, singles: &[Candidate], loose: &[f64], ba
     let mut starts = coarse_starts(&rest, &singles[..1], singles, loose);
     starts.truncate(k.pairs_searched);
     let found = starts.into_par_iter().filter_map(|start| {
-        let fit = refine_from(&rest, &start.members, start.u, loose)?;
+        let hunt = Hunt { problem: &rest, members: &start.members, variance: loose };
+        let fit = hunt.refine_from(start.u)?;
         let bent = Freedom { share: middle_freedom(k, &start.members).share, ..leader.freedom };
-        Some(Pair::of(laplace(problem, &start.members, &fit.u, basis, bent, ROUNDS[0])))
+        Some(laplace(problem, &start.members, &fit.u, basis, bent, ROUNDS[0]))
     });
     found.collect()
 }
@@ -214,9 +202,10 @@ fn coarse_starts(problem: &Problem, seeds: &[Candidate], singles: &[Candidate], 
             let alone = &e.u[NUISANCES..];
             // A cause that acts as a gain of the stiffness, the amplitude or the speed hides in the
             // stiffnesses that the single drove to imitate it.
+            let hunt = Hunt { problem, members: &members, variance: loose };
             nuisance_starts(&seed.u, k.driven_sd)
                 .iter()
-                .filter_map(|fixed| coarse_scan(problem, &members, fixed, loose, alone))
+                .filter_map(|fixed| hunt.coarse_scan(fixed, alone))
                 .min_by(|a, b| a.0.total_cmp(&b.0))
                 .map(|(cost, u)| Start { cost, members, u })
         })
@@ -224,7 +213,9 @@ fn coarse_starts(problem: &Problem, seeds: &[Candidate], singles: &[Candidate], 
     Start::sort(&mut scans);
     let mut chosen: Vec<Start> = Vec::new();
     for scan in scans {
-        if chosen.iter().filter(|c| c.effects() == scan.effects()).count() < LAWS_OF_A_PAIR {
+        if chosen.iter().filter(|c| effects_of(&c.members) == effects_of(&scan.members)).count()
+            < LAWS_OF_A_PAIR
+        {
             chosen.push(scan);
         }
         if chosen.len() == k.pairs_fitted {
@@ -238,24 +229,23 @@ fn coarse_starts(problem: &Problem, seeds: &[Candidate], singles: &[Candidate], 
 pub fn pairs(problem: &Problem, singles: &[Candidate], loose: &[f64], basis: &Basis) -> Vec<Candidate> {
     let k = &problem.constants;
     let seeds = &singles[..singles.len().min(k.pair_seeds)];
-    let mut first: Vec<Pair> = coarse_starts(problem, seeds, singles, loose)
+    let mut first: Vec<Posterior> = coarse_starts(problem, seeds, singles, loose)
         .into_par_iter()
         .filter_map(|start| {
             nuisance_starts(&start.u, k.driven_sd)
                 .into_iter()
                 .filter_map(|u| refined(problem, Start { u, ..start.clone() }, loose, basis))
                 .max_by(|a, b| a.log_evidence.total_cmp(&b.log_evidence))
-                .map(Pair::of)
         })
         .collect();
     first.extend(beside_a_function(problem, singles, loose, basis));
     let mut found = with_every_law(problem, first, singles, loose, basis);
-    let twins: Vec<Pair> = found
+    let twins: Vec<Posterior> = found
         .par_iter()
-        .flat_map_iter(|pair| twins(problem, singles, &pair.posterior))
+        .flat_map_iter(|pair| twins(problem, singles, pair))
         .map(|(members, u)| {
             let freedom = middle_freedom(k, &members);
-            Pair::of(laplace(problem, &members, &u, basis, freedom, ROUNDS[1]))
+            laplace(problem, &members, &u, basis, freedom, ROUNDS[1])
         })
         .collect();
     found.extend(twins);
@@ -263,28 +253,27 @@ pub fn pairs(problem: &Problem, singles: &[Candidate], loose: &[f64], basis: &Ba
 }
 
 /// Each pair with its evidence over the shares of form uncertainty, in its best two laws.
-fn weighed(problem: &Problem, pairs: Vec<Pair>, basis: &Basis) -> Vec<Candidate> {
+fn weighed(problem: &Problem, pairs: Vec<Posterior>, basis: &Basis) -> Vec<Candidate> {
     let k = &problem.constants;
-    let top = pairs.iter().map(|p| p.posterior.log_evidence).fold(f64::NEG_INFINITY, f64::max);
+    let top = pairs.iter().map(|p| p.log_evidence).fold(f64::NEG_INFINITY, f64::max);
     // By their laws the best pairs may be far behind a bent one, and not where they are bent too.
     let mut by_law: Vec<f64> =
-        pairs.iter().filter(|p| p.posterior.freedom.bend == 0.0).map(|p| p.posterior.log_evidence).collect();
+        pairs.iter().filter(|p| p.freedom.bend == 0.0).map(|p| p.log_evidence).collect();
     by_law.sort_by(|a, b| b.total_cmp(a));
     let nth = by_law.get(k.pair_seeds).copied().unwrap_or(f64::NEG_INFINITY);
-    let weighed: Vec<(Vec<usize>, f64, Posterior)> = pairs
+    let weighed: Vec<(f64, Posterior)> = pairs
         .into_par_iter()
-        .map(|Pair { effects, posterior: e }| {
+        .map(|e| {
             if e.log_evidence > nth.min(top - k.prune_nats) {
-                let fit = Fit { u: e.u.clone(), prediction: e.prediction.clone(), cost: 0.0 };
-                let (evidence, best) = averaged_over_form(problem, &fit, &e.members, basis);
-                (effects, evidence, best)
+                averaged_over_form(problem, &e.u, &e.members, basis)
             } else {
-                (effects, e.log_evidence + k.form_weights[1].ln(), e)
+                (e.log_evidence + k.form_weights[1].ln(), e)
             }
         })
         .collect();
     let mut list: Vec<Candidate> = Vec::new();
-    for (effects, evidence, best) in weighed {
+    for (evidence, best) in weighed {
+        let effects = effects_of(&best.members);
         let laws: f64 = best.members.iter().map(|m| effects::at(m.effect).laws.len() as f64).product();
         // Only the best pair of laws was fitted: the others are taken to add nothing.
         let log_evidence = evidence - laws.ln();

@@ -97,9 +97,9 @@ pub fn remark(list: &[SeenFrom]) -> Option<String> {
 mod tests {
     use crate::Verdict;
     use crate::data::Table;
-    use crate::example::{Deviates, rig, table};
     use crate::hypotheses::Options;
     use crate::layout::Layout;
+    use crate::tests::{Deviates, rig, table};
     use crate::verdict::diagnose;
 
     /// A gap of 0.4 of what is stated is rarely claimed, one of twice as much mostly: what noise adds to the

@@ -52,8 +52,8 @@ impl Progress {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::example::{Deviates, rig, table};
     use crate::hypotheses::Options;
+    use crate::tests::{Deviates, rig, table};
     use std::sync::Mutex;
 
     #[test]

@@ -297,7 +297,7 @@ impl WithSuspects {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::example::{Deviates, rig, table};
+    use crate::tests::{Deviates, rig, table};
     use crate::verdict::diagnose;
 
     /// A load that rises with time is reported; a table in random order has no such pair.

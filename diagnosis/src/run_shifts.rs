@@ -65,8 +65,8 @@ fn neighbours(table: &Table, run: usize, time_s: f64) -> Option<(usize, usize, f
 #[cfg(test)]
 mod tests {
     use crate::decision::Verdict;
-    use crate::example::{Deviates, rig, table};
     use crate::hypotheses::Options;
+    use crate::tests::{Deviates, rig, table};
     use crate::verdict::diagnose;
 
     /// Three runs of which one reads 12 % more, no other gap: what the verdict's model says is the

@@ -7,6 +7,7 @@ use crate::layout::Layout;
 use crate::verdict::Diagnosis;
 use effects::Location;
 use effects::corrected::{SavedEffect, SavedModel, SavedParameter};
+use std::ops::Range;
 
 /// Least relative uncertainty that a model states.
 const LEAST_RELATIVE_SD: f64 = 0.005;
@@ -45,36 +46,29 @@ impl Diagnosis {
 fn saved_effects(problem: &Problem, best: &Posterior) -> Vec<SavedEffect> {
     let thetas = problem.thetas(&best.members, &best.u);
     let layout = Layout::of(&best.members);
-    let members = best.members.iter().zip(layout.members()).zip(thetas);
-    members
-        .map(|((member, places), theta)| saved_effect(problem, best, *member, places.start, &theta))
-        .collect()
-}
-
-/// One member, whose coordinates begin at `first`.
-fn saved_effect(
-    problem: &Problem,
-    best: &Posterior,
-    member: Member,
-    first: usize,
-    theta: &[f64],
-) -> SavedEffect {
-    let own = member.parameters(&problem.design);
-    // Covariance in the parameters' units, by the slope of each coordinate.
-    let slope: Vec<f64> = (own.iter().zip(&best.u[first..]))
-        .map(|(p, u)| (p.value(u + STEP) - p.value(u - STEP)) / (2.0 * STEP))
-        .collect();
-    let entry = |i: usize, j: usize| best.covariance[(first + i, first + j)] * slope[i] * slope[j];
-    let all = 0..own.len();
-    let acts_on = if member.place() == Location::Instrument { "reading" } else { "prediction" };
-    SavedEffect {
-        name: member.name().to_string(),
-        law: member.form().name.to_string(),
-        acts_on: acts_on.to_string(),
-        parameters: (own.iter().zip(theta))
-            .map(|(p, v)| SavedParameter { name: p.name.to_string(), value: *v, unit: p.unit.to_string() })
-            .collect(),
-        covariance: all.clone().map(|i| all.clone().map(|j| entry(i, j)).collect()).collect(),
-        table: effects::at(member.effect).own.map(|own| own.text.clone()),
-    }
+    let one = |((member, places), theta): ((&Member, Range<usize>), Vec<f64>)| {
+        let (own, first) = (member.parameters(&problem.design), places.start);
+        // Covariance in the parameters' units, by the slope of each coordinate.
+        let slope: Vec<f64> = (own.iter().zip(&best.u[first..]))
+            .map(|(p, u)| (p.value(u + STEP) - p.value(u - STEP)) / (2.0 * STEP))
+            .collect();
+        let entry = |i: usize, j: usize| best.covariance[(first + i, first + j)] * slope[i] * slope[j];
+        let all = 0..own.len();
+        let acts_on = if member.place() == Location::Instrument { "reading" } else { "prediction" };
+        SavedEffect {
+            name: member.name().to_string(),
+            law: member.form().name.to_string(),
+            acts_on: acts_on.to_string(),
+            parameters: (own.iter().zip(&theta))
+                .map(|(p, v)| SavedParameter {
+                    name: p.name.to_string(),
+                    value: *v,
+                    unit: p.unit.to_string(),
+                })
+                .collect(),
+            covariance: all.clone().map(|i| all.clone().map(|j| entry(i, j)).collect()).collect(),
+            table: effects::at(member.effect).own.map(|own| own.text.clone()),
+        }
+    };
+    best.members.iter().zip(layout.members()).zip(thetas).map(one).collect()
 }

@@ -201,8 +201,8 @@ fn refits(folds: usize) -> f64 {
 mod tests {
     use super::Gap;
     use crate::decision::Verdict;
-    use crate::example::{Deviates, rig, runs};
     use crate::hypotheses::Options;
+    use crate::tests::{Deviates, rig, runs};
     use crate::verdict::diagnose;
 
     /// One run of four has a quarter more friction: no cause is fixed within a run alone, and what four shifts

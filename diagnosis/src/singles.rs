@@ -11,6 +11,7 @@ use crate::progress::Progress;
 use crate::starts::{REFINED_ROWS, Sought, nuisance_starts, seek};
 use effects::{known, library};
 use rayon::prelude::*;
+use std::collections::BTreeSet;
 use std::sync::atomic::{AtomicUsize, Ordering};
 
 /// Share of the work after which single effects are fitted.
@@ -163,8 +164,7 @@ fn each_law(problem: &Problem, members: &[Member], search: &Search<'_>) -> Vec<O
         .map(|(i, found)| {
             found.map(|e| {
                 if e.log_evidence > top - k.prune_nats || weighed.contains(&i) {
-                    let fit = Fit { u: e.u.clone(), prediction: e.prediction.clone(), cost: 0.0 };
-                    averaged_over_form(problem, &fit, &e.members, search.basis)
+                    averaged_over_form(problem, &e.u, &e.members, search.basis)
                 } else {
                     (e.log_evidence + k.form_weights[1].ln(), e)
                 }
@@ -180,13 +180,8 @@ fn sized(problem: &Problem, middle: &[Option<Posterior>], basis: &Basis) -> Vec<
         middle.iter().enumerate().filter_map(|(i, e)| Some((i, e.as_ref()?))).collect();
     best.retain(|(_, e)| basis.bends(&e.members, Bends::Size));
     best.sort_by(|a, b| b.1.log_evidence.total_cmp(&a.1.log_evidence));
-    let mut seen = Vec::new();
-    best.retain(|(_, e)| {
-        let effect = e.members[0].effect;
-        let new = !seen.contains(&effect);
-        seen.push(effect);
-        new
-    });
+    let mut seen = BTreeSet::new();
+    best.retain(|(_, e)| seen.insert(e.members[0].effect));
     best.into_iter().take(problem.constants.pair_seeds).map(|(i, _)| i).collect()
 }
 

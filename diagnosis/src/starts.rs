@@ -110,55 +110,9 @@ impl Sought {
     }
 }
 
-/// Best cost of a coarse scan of the last member about coordinates that it had alone, with the place it was found.
-pub fn coarse_scan(
-    problem: &Problem,
-    members: &[Member],
-    fixed: &[f64],
-    variance: &[f64],
-    alone: &[f64],
-) -> Option<(f64, Vec<f64>)> {
-    let last = members.last()?;
-    let (low, high) = last.parameters(&problem.design)[0].coordinate_bounds();
-    let mut list = vec![alone.to_vec()];
-    let reach = if alone[0].abs() > 0.05 { alone[0] } else { 0.3 };
-    let own = [0.15, 0.4, 1.0, 2.0, -0.4, -1.0].map(|factor| reach * factor);
-    // What it did alone says little of a large size beside another cause.
-    for size in own.into_iter().chain([-3.0, -1.2, 1.2, 3.0]) {
-        let mut tail = alone.to_vec();
-        tail[0] = size.clamp(low, high);
-        list.push(tail);
-    }
-    let rows = rows(problem.len(), PAIR_SCAN_ROWS);
-    let scored = Hunt { problem, members, variance }.scan(fixed, &rows, list);
-    let (cost, u) = scored.into_iter().next()?;
-    Some((of_all(cost, problem, &rows), u))
-}
-
 /// A cost as if all of the table had been looked at: laws are scanned on different numbers of rows.
 fn of_all(cost: f64, problem: &Problem, rows: &[usize]) -> f64 {
     cost * problem.len() as f64 / rows.len().max(1) as f64
-}
-
-/// Best cost of the whole scan of the last member beside the given coordinates of the others, with the place.
-pub fn full_scan(
-    problem: &Problem,
-    members: &[Member],
-    fixed: &[f64],
-    variance: &[f64],
-) -> Option<(f64, Vec<f64>)> {
-    let (rows, scored) = Hunt { problem, members, variance }.scanned(fixed);
-    let (cost, u) = scored.into_iter().next()?;
-    Some((of_all(cost, problem, &rows), u))
-}
-
-/// Local fit of a pair from one start.
-pub fn refine_from(problem: &Problem, members: &[Member], start: Vec<f64>, variance: &[f64]) -> Option<Fit> {
-    let rows = rows(problem.len(), SCAN_ROWS);
-    let fixed = start.len() - members.last()?.count();
-    let hunt = Hunt { problem, members, variance };
-    let fits = hunt.begun(fixed, &rows, &[(0.0, start)], 1);
-    hunt.finished(&rows, fits, 1).into_iter().next()
 }
 
 /// At most so many rows, one from each of as many even blocks, at a place in it that steps by the golden
@@ -177,13 +131,46 @@ fn rows(n: usize, limit: usize) -> Vec<usize> {
 
 /// A law, alone or beside others, on a problem with these variances.
 #[derive(Clone, Copy)]
-struct Hunt<'a> {
-    problem: &'a Problem,
-    members: &'a [Member],
-    variance: &'a [f64],
+pub(crate) struct Hunt<'a> {
+    pub problem: &'a Problem,
+    pub members: &'a [Member],
+    pub variance: &'a [f64],
 }
 
 impl Hunt<'_> {
+    /// Best cost of a coarse scan of the last member about coordinates that it had alone, with the place.
+    pub fn coarse_scan(&self, fixed: &[f64], alone: &[f64]) -> Option<(f64, Vec<f64>)> {
+        let last = self.members.last()?;
+        let (low, high) = last.parameters(&self.problem.design)[0].coordinate_bounds();
+        let mut list = vec![alone.to_vec()];
+        let reach = if alone[0].abs() > 0.05 { alone[0] } else { 0.3 };
+        let own = [0.15, 0.4, 1.0, 2.0, -0.4, -1.0].map(|factor| reach * factor);
+        // What it did alone says little of a large size beside another cause.
+        for size in own.into_iter().chain([-3.0, -1.2, 1.2, 3.0]) {
+            let mut tail = alone.to_vec();
+            tail[0] = size.clamp(low, high);
+            list.push(tail);
+        }
+        let rows = rows(self.problem.len(), PAIR_SCAN_ROWS);
+        let (cost, u) = self.scan(fixed, &rows, list).into_iter().next()?;
+        Some((of_all(cost, self.problem, &rows), u))
+    }
+
+    /// Best cost of the whole scan of the last member beside the coordinates of the others, with the place.
+    pub fn full_scan(&self, fixed: &[f64]) -> Option<(f64, Vec<f64>)> {
+        let (rows, scored) = self.scanned(fixed);
+        let (cost, u) = scored.into_iter().next()?;
+        Some((of_all(cost, self.problem, &rows), u))
+    }
+
+    /// Local fit of a pair from one start.
+    pub fn refine_from(&self, start: Vec<f64>) -> Option<Fit> {
+        let rows = rows(self.problem.len(), SCAN_ROWS);
+        let fixed = start.len() - self.members.last()?.count();
+        let fits = self.begun(fixed, &rows, &[(0.0, start)], 1);
+        self.finished(&rows, fits, 1).into_iter().next()
+    }
+
     fn part(&self, rows: &[usize]) -> (Problem, Vec<f64>) {
         (self.problem.sketch(rows), rows.iter().map(|&i| self.variance[i]).collect())
     }
@@ -311,11 +298,6 @@ fn distinct(fits: &mut Vec<Fit>) {
 /// large, not on its last per cent.
 pub fn tempered(problem: &Problem, gap: &DVector<f64>, share: f64) -> Vec<f64> {
     problem.variance.iter().zip(gap.iter()).map(|(v, g)| v + (share * g).powi(2)).collect()
-}
-
-/// Coordinates of a baseline fit followed by nothing: where a single effect starts from.
-pub fn nuisances_of(fit: &Fit) -> Vec<f64> {
-    fit.u[..NUISANCES].to_vec()
 }
 
 /// Where nuisances start: where they are, and at their calibration if they have been driven far from it to

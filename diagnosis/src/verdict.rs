@@ -59,12 +59,6 @@ pub struct NotTestable {
     pub because: String,
 }
 
-impl NotTestable {
-    fn of((effect, because): &(&'static str, String)) -> Self {
-        NotTestable { effect: (*effect).to_string(), because: because.clone() }
-    }
-}
-
 /// What the leader did on regions that were left out of its fit.
 #[derive(Debug, Clone, PartialEq, Serialize, schemars::JsonSchema)]
 pub struct LeftOut {
@@ -205,19 +199,23 @@ pub fn diagnose(table: &Table, rig: &RigFile, options: &Options, sha256: String)
     }
     remarks.extend(of_table(&fitted, table, &decision));
     remarks.extend(of_scatter(&fitted, &decision, with_suspects.as_ref()));
-    let stiffness_pulls = match decision.verdict {
-        Verdict::NoGap => pulls(&fitted.problem, &fitted.none, &fitted.none),
-        Verdict::Named | Verdict::Ambiguous => {
-            best.map_or_else(Vec::new, |best| pulls(&fitted.problem, &fitted.none, best))
-        }
-        Verdict::Unknown => Vec::new(),
+    let holds = match decision.verdict {
+        Verdict::NoGap => Some(&fitted.none),
+        Verdict::Named | Verdict::Ambiguous => best,
+        Verdict::Unknown => None,
     };
+    let pulls = |model| pulls(&fitted.problem, &fitted.none, model);
+    let stiffness_pulls = holds.map_or_else(Vec::new, pulls);
     let seen_from = if decision.verdict == Verdict::NoGap { seen_from(&fitted) } else { Vec::new() };
     remarks.extend(gap.remark());
     remarks.extend(crate::power::remark(&seen_from));
     remarks.extend(stiffness_pulls.iter().filter_map(Pull::remark));
     let psi_reading = crate::reading::of_table(table, rig, &fitted.scatter);
     remarks.extend(crate::reading::remark(psi_reading.as_ref(), decision.verdict));
+    let not_testable = |(effect, because): &(&'static str, String)| NotTestable {
+        effect: effect.to_string(),
+        because: because.clone(),
+    };
     let report = Report {
         schema: "muprime.verdict/1",
         verdict: decision.verdict,
@@ -241,7 +239,7 @@ pub fn diagnose(table: &Table, rig: &RigFile, options: &Options, sha256: String)
         stiffness_pulls,
         description: description(&fitted, &decision),
         at_least: at_least(&fitted, &decision),
-        not_testable: fitted.not_testable.iter().map(NotTestable::of).collect(),
+        not_testable: fitted.not_testable.iter().map(not_testable).collect(),
         seen_from,
         psi_reading,
         record: None,

@@ -9,7 +9,7 @@ use calibration::amplitude::droop::{Exponent, droop};
 use calibration::amplitude::gain::{Form, fit};
 use calibration::amplitude::map::mode_shape;
 use calibration::amplitude::resonance::sweep;
-use calibration::amplitude::vibrometer::{Decoder, sine};
+use calibration::amplitude::vibrometer::{Decoder, amplitude};
 use calibration::certificate::{CertificateKind, Outcome};
 use calibration::uncertainty::student::coverage_factor;
 use models::quantity::PeakToPeak;
@@ -100,7 +100,7 @@ impl Bench {
             .collect();
         // Speckle changes the signal from spot to spot: half a per cent of repeatability.
         let speckle = 1.0 + SPECKLE_SD * self.draw.normal();
-        sine(&volts, rate, frequency_hz, &self.decoder).unwrap().amplitude().metres() * speckle
+        amplitude(&volts, rate, frequency_hz, &self.decoder).unwrap().metres() * speckle
     }
 }
 

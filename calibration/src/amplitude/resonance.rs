@@ -1,7 +1,7 @@
 //! Resonance frequency and quality factor from a frequency sweep at constant drive.
 
 use super::{AmplitudeError, AmplitudePoint, check, weighted};
-use crate::regression::{Fit, FitError, nonlinear};
+use crate::regression::{Fit, FitError, ends, nonlinear};
 
 /// The resonance that a sweep shows.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -25,19 +25,15 @@ pub struct Resonance {
 /// Fewer than seven frequencies, a sweep that does not hold the resonance, no convergence.
 pub fn sweep(points: &[AmplitudePoint]) -> Result<Resonance, AmplitudeError> {
     check(points, "frequencies", 7)?;
-    let top = *points
-        .iter()
-        .max_by(|a, b| a.amplitude_pp_m.total_cmp(&b.amplitude_pp_m))
-        .ok_or(AmplitudeError::TooFew { what: "frequencies", found: 0, needed: 7 })?;
-    for (end, beyond) in
-        [("lower", points.iter().all(|p| p.at >= top.at)), ("upper", points.iter().all(|p| p.at <= top.at))]
-    {
-        if beyond {
+    let highest = points.iter().max_by(|a, b| a.amplitude_pp_m.total_cmp(&b.amplitude_pp_m));
+    let top = *highest.unwrap_or(&points[0]);
+    for (end, at) in ["lower", "upper"].into_iter().zip(ends(points.iter().map(|p| p.at))) {
+        if top.at == at {
             return Err(AmplitudeError::OffRange(end));
         }
     }
     let wide = points.iter().filter(|p| p.amplitude_pp_m > 0.707 * top.amplitude_pp_m);
-    let [low, high] = wide.fold([top.at, top.at], |[a, b], p| [a.min(p.at), b.max(p.at)]);
+    let [low, high] = ends(wide.map(|p| p.at));
     let width = (high - low).max(1e-5 * top.at);
     let fit = weighted(points, |scatter| best(points, scatter, &top, width))?;
     let q = fit.estimates[1].exp();

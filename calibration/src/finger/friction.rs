@@ -91,12 +91,7 @@ pub fn friction(points: &[FrictionPoint]) -> Result<FrictionFit, FingerError> {
         Some(times) => {
             let model = |i: usize, b: &[f64], g: &mut [f64]| {
                 let base = straight(i, b, g);
-                let (t, tau) = (times[i], b[4].exp());
-                let e = (-t / tau).exp();
-                let inner = 1.0 + b[3] * (1.0 - e);
-                g[3] = (1.0 - e) / inner;
-                g[4] = -b[3] * e * (t / tau) / inner;
-                base + inner.max(1e-9).ln()
+                base + grown(times[i], b, g).max(1e-9).ln()
             };
             let [low, high] = span(times);
             // The time constant may lie anywhere in the record: the best of several starts counts.
@@ -117,6 +112,16 @@ pub fn friction(points: &[FrictionPoint]) -> Result<FrictionFit, FingerError> {
             timed.as_deref().map_or([f64::NAN; 2], span),
         ],
     })
+}
+
+/// The factor `1 + g (1 - exp(-t/tau))` of a time since contact; its logarithm's derivatives by g and ln tau.
+fn grown(t: f64, b: &[f64], g: &mut [f64]) -> f64 {
+    let tau = b[4].exp();
+    let e = (-t / tau).exp();
+    let inner = 1.0 + b[3] * (1.0 - e);
+    g[3] = (1.0 - e) / inner;
+    g[4] = -b[3] * e * (t / tau) / inner;
+    inner
 }
 
 impl FrictionFit {
@@ -144,12 +149,7 @@ impl FrictionFit {
         g[2] = (speed_m_s / self.reference_speed_m_s).ln();
         let mut ln = b[0] + b[1] * g[1] + b[2] * g[2];
         if self.timed() {
-            let tau = b[4].exp();
-            let e = (-contact_time_s / tau).exp();
-            let inner = 1.0 + b[3] * (1.0 - e);
-            g[3] = (1.0 - e) / inner;
-            g[4] = -b[3] * e * (contact_time_s / tau) / inner;
-            ln += inner.ln();
+            ln += grown(contact_time_s, b.as_slice(), &mut g).ln();
         }
         let mu = ln.exp();
         [mu, mu * self.fit.standard_uncertainty_along(&g)]

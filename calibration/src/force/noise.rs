@@ -174,15 +174,11 @@ impl EqualSamples {
         }
         let pairs = (counts.len() - 1) as f64;
         let equal = counts.windows(2).filter(|w| w[0] == w[1]).count() as f64;
-        let (mut longest, mut run) = (1, 1);
-        for w in counts.windows(2) {
-            run = if w[0] == w[1] { run + 1 } else { 1 };
-            longest = longest.max(run);
-        }
+        let longest_run = counts.chunk_by(|a, b| a == b).map(<[i64]>::len).max().unwrap_or(1);
         let (p, z) = (equal / pairs, 3.0902);
         let centre = p + z * z / (2.0 * pairs);
         let half = z * (p * (1.0 - p) / pairs + z * z / (4.0 * pairs * pairs)).sqrt();
-        Some(EqualSamples { share: p, upper: (centre + half) / (1.0 + z * z / pairs), longest_run: longest })
+        Some(EqualSamples { share: p, upper: (centre + half) / (1.0 + z * z / pairs), longest_run })
     }
 
     /// Number of equal samples in a row after which a channel counts as frozen, such that a live one is

@@ -40,13 +40,10 @@ pub fn fit(model: &Model, observations: &[f64], start: &[f64]) -> Result<Fit, Fi
     if !sum.is_finite() || j.iter().any(|x| !x.is_finite()) {
         return Err(FitError::NotFinite { place: "model at the starting point" });
     }
-    let mut scale: Vec<f64> = (0..p).map(|k| j.column(k).norm().max(f64::MIN_POSITIVE)).collect();
     let (mut damping, mut growth) = (1e-3, 2.0);
     let mut settled = 0;
     for _ in 0..ITERATIONS {
-        for (k, s) in scale.iter_mut().enumerate() {
-            *s = j.column(k).norm().max(f64::MIN_POSITIVE);
-        }
+        let scale: Vec<f64> = (0..p).map(|k| j.column(k).norm().max(f64::MIN_POSITIVE)).collect();
         let step = damped_step(&j, &r, &scale, damping);
         let next = &b + &step;
         let small = step.iter().zip(b.iter()).all(|(s, b)| s.abs() <= 4.0 * f64::EPSILON * b.abs());
@@ -54,8 +51,7 @@ pub fn fit(model: &Model, observations: &[f64], start: &[f64]) -> Result<Fit, Fi
         let next_sum = next_r.norm_squared();
         let usable = next_sum.is_finite() && next_j.iter().all(|x| x.is_finite());
         // Near the minimum the sum of squares is flat to rounding: steps there are judged by their size.
-        let flat = usable && next_sum <= sum * (1.0 + 8.0 * f64::EPSILON);
-        if flat {
+        if usable && next_sum <= sum * (1.0 + 8.0 * f64::EPSILON) {
             let predicted = sum - (&r - &j * &step).norm_squared();
             let gain = if predicted > 0.0 { (sum - next_sum) / predicted } else { 1.0 };
             let improved = sum - next_sum > 1e-13 * sum;

@@ -1,8 +1,8 @@
 //! Tables that are refused, and what a table can show.
 
 use super::*;
-use crate::example::{Deviates, rig, table};
 use crate::hypotheses::Options;
+use crate::tests::{Deviates, rig, table};
 use crate::verdict::diagnose;
 use models::pass::read_passes;
 

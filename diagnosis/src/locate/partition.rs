@@ -1,5 +1,6 @@
 //! The operating space cut into parts, as a regression tree is grown (Breiman et al. 1984), by the chance of standing out.
 
+use crate::scatter::clusters::moments;
 use models::condition::Condition;
 use models::covariate::{self, Role};
 use std::collections::BTreeMap;
@@ -17,13 +18,6 @@ pub(super) struct Cut {
     covariate: usize,
     pub at: Vec<f64>,
     above: Vec<u8>,
-}
-
-/// Standard deviation.
-fn spread(values: &[f64]) -> f64 {
-    let n = values.len().max(1) as f64;
-    let mean = values.iter().sum::<f64>() / n;
-    (values.iter().map(|v| (v - mean).powi(2)).sum::<f64>() / n).sqrt()
 }
 
 /// Smallest and largest value of each level: values within 2 % of its smallest one are one setting that
@@ -45,7 +39,7 @@ pub(super) fn cuts(passes: &[Condition], places: &[Condition]) -> Vec<Cut> {
     let one = |index: usize| {
         let covariate = covariate::COVARIATES[index];
         let values = covariate.of_all(places)?;
-        if covariate.role == Role::Climate && spread(&values) < covariate.least_spread {
+        if covariate.role == Role::Climate && moments(&values).1 < covariate.least_spread {
             return None;
         }
         let mut sorted = values.clone();

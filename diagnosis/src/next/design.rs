@@ -77,10 +77,7 @@ fn both(
 }
 
 /// The hypothesis that the leader (the first) is most to be parted from.
-pub fn rival(hypotheses: &[Predictive], chosen: &[usize]) -> Option<usize> {
-    if chosen.is_empty() {
-        return None;
-    }
+pub fn rival(hypotheses: &[Predictive]) -> Option<usize> {
     (1..hypotheses.len())
         .max_by(|&a, &b| hypotheses[a].probability.total_cmp(&hypotheses[b].probability).then(b.cmp(&a)))
 }
@@ -109,9 +106,9 @@ mod tests {
     const MOST: f64 = 4.0;
     use crate::decision::decide;
     use crate::evidence::{Posterior, laplace};
-    use crate::example::{Deviates, rig, table};
     use crate::hypotheses::{Fitted, Options, fit_all};
     use crate::next::{PASSES, grid, predictive::predictives};
+    use crate::tests::{Deviates, rig, table};
     use models::condition::Condition;
 
     /// Log evidence of a hypothesis with further passes, or without.

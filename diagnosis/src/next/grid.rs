@@ -36,32 +36,14 @@ pub fn conditions(table: &Table) -> Vec<Condition> {
     pressures.dedup();
     let pressures = spread(&pressures, PRESSURES);
     let positions = places(of(&|p| p.position_m));
-    let template = further(table);
-    let mut list = Vec::new();
-    for &amplitude in &amplitudes {
-        for &frequency_hz in &spread(&frequencies, FREQUENCIES) {
-            for &speed_m_s in &in_ratio(of(&|p| p.speed_m_s), SPEEDS) {
-                for &normal_force_n in &in_ratio(of(&|p| p.normal_force_n), LOADS) {
-                    for &position_m in &positions {
-                        for &ambient_pressure_pa in &pressures {
-                            for direction in directions(table) {
-                                list.push(Condition {
-                                    amplitude: PeakToPeak::from_metres(amplitude),
-                                    frequency_hz,
-                                    speed_m_s,
-                                    normal_force_n,
-                                    position_m,
-                                    direction,
-                                    ambient_pressure_pa,
-                                    ..template
-                                });
-                            }
-                        }
-                    }
-                }
-            }
-        }
-    }
+    let amplitudes: Vec<PeakToPeak> = amplitudes.into_iter().map(PeakToPeak::from_metres).collect();
+    let list = with_each(&[further(table)], &amplitudes, |c| &mut c.amplitude);
+    let list = with_each(&list, &spread(&frequencies, FREQUENCIES), |c| &mut c.frequency_hz);
+    let list = with_each(&list, &in_ratio(of(&|p| p.speed_m_s), SPEEDS), |c| &mut c.speed_m_s);
+    let list = with_each(&list, &in_ratio(of(&|p| p.normal_force_n), LOADS), |c| &mut c.normal_force_n);
+    let list = with_each(&list, &positions, |c| &mut c.position_m);
+    let list = with_each(&list, &pressures, |c| &mut c.ambient_pressure_pa);
+    let mut list = with_each(&list, &directions(table), |c| &mut c.direction);
     let (low, high) = (positions[0], positions[positions.len() - 1]);
     let shown = |p: &Condition| {
         let as_fast = || passes.iter().filter(|q| q.speed_m_s > 0.95 * p.speed_m_s);
@@ -73,6 +55,20 @@ pub fn conditions(table: &Table) -> Vec<Condition> {
         list.retain(shown);
     }
     thinned(&list)
+}
+
+/// Every condition with each of these values of one setting.
+fn with_each<T: Copy>(
+    list: &[Condition],
+    values: &[T],
+    setting: fn(&mut Condition) -> &mut T,
+) -> Vec<Condition> {
+    let with = |condition: &Condition, value: &T| {
+        let mut condition = *condition;
+        *setting(&mut condition) = *value;
+        condition
+    };
+    list.iter().flat_map(|c| values.iter().map(move |v| with(c, v))).collect()
 }
 
 /// Change of the lateral force from the reference without vibration, `(1 - mu') mu_0 F_n` (Eq. 5), in N; of

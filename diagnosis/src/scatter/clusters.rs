@@ -203,7 +203,7 @@ fn quantiles(values: &[f64], count: usize) -> Vec<usize> {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::example::{Deviates, rig, table};
+    use crate::tests::{Deviates, rig, table};
 
     /// Scatter does not cluster; a step at the lightest load does, and is found there.
     #[test]

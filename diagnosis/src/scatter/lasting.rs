@@ -65,7 +65,7 @@ pub fn powers(rho: f64, n: usize, modes: usize) -> Vec<f64> {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::example::{Deviates, table};
+    use crate::tests::{Deviates, table};
 
     /// The variance of the mean of all passes is that of an autoregression: `(1 + rho) / (1 - rho)` of
     /// independent ones.

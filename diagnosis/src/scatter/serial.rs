@@ -67,7 +67,7 @@ pub fn columns(rho: f64, table: &Table, problem: &Problem, inflation: &[f64]) ->
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::example::{Deviates, rig, table};
+    use crate::tests::{Deviates, rig, table};
 
     /// A slow drift is no correlation of the scatter; a correlation is found beside it; independent scatter
     /// has none.

@@ -82,21 +82,19 @@ impl State {
 
     /// States one step away.
     fn neighbours(&self, k: &Constants) -> Vec<State> {
-        let step = |at: usize, len: usize| {
-            [at.checked_sub(1), (at + 1 < len).then_some(at + 1)].into_iter().flatten().collect::<Vec<_>>()
-        };
         let mut list: Vec<State> = Vec::new();
-        list.extend(step(self.scale, k.scatter_scales.len()).iter().map(|&scale| State { scale, ..*self }));
-        list.extend(step(self.even, k.discrepancy_even.len()).iter().map(|&even| State { even, ..*self }));
-        list.extend(step(self.odd, k.discrepancy_odd.len()).iter().map(|&odd| State { odd, ..*self }));
-        list.extend(step(self.slow, self.most.size + 1).iter().map(|&slow| State { slow, ..*self }));
+        let mut step = |at: usize, len: usize, to: &dyn Fn(usize) -> State| {
+            list.extend([at.checked_sub(1), (at + 1 < len).then_some(at + 1)].into_iter().flatten().map(to));
+        };
+        step(self.scale, k.scatter_scales.len(), &|scale| State { scale, ..*self });
+        step(self.even, k.discrepancy_even.len(), &|even| State { even, ..*self });
+        step(self.odd, k.discrepancy_odd.len(), &|odd| State { odd, ..*self });
+        step(self.slow, self.most.size + 1, &|slow| State { slow, ..*self });
         if self.slow > 0 {
-            list.extend(
-                step(self.lasts, self.most.correlation + 1).iter().map(|&lasts| State { lasts, ..*self }),
-            );
+            step(self.lasts, self.most.correlation + 1, &|lasts| State { lasts, ..*self });
         }
         if self.with_runs {
-            list.extend(step(self.run, k.run_sds.len()).iter().map(|&run| State { run, ..*self }));
+            step(self.run, k.run_sds.len(), &|run| State { run, ..*self });
         }
         list
     }

@@ -81,7 +81,7 @@ pub const BOUNDED_SD: f64 = 3.0;
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::example::{Deviates, rig, table};
+    use crate::tests::{Deviates, rig, table};
 
     /// Of a thousand normal deviates hardly one is called suspect; ten far passes are.
     #[test]

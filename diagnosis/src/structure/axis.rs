@@ -1,5 +1,6 @@
 //! What a shape goes over: a covariate of the pass itself, or what the pass before it in its run had of it.
 
+use crate::kernel::scaled;
 use models::condition::Condition;
 use models::covariate::{COVARIATES, Covariate, DIRECTION, Role};
 use nalgebra::{DMatrix, DVector};
@@ -57,10 +58,8 @@ impl Axis {
     /// The histories that a table can separate from the settings of its passes. Where settings rise from pass to
     /// pass, what the pass before had is what the pass has, and a law.
     pub(super) fn histories(passes: &[Condition], past: &Arc<Past>, largest_amplitude: f64) -> Vec<Axis> {
-        let own: Vec<Vec<f64>> = COVARIATES
-            .iter()
-            .filter_map(|c| passes.iter().map(|p| c.of(p).map(|v| c.scaled(v, largest_amplitude))).collect())
-            .collect();
+        let own: Vec<Vec<f64>> =
+            COVARIATES.iter().filter_map(|c| scaled(c, passes, largest_amplitude)).collect();
         let set = |c: &&&Covariate| matches!(c.role, Role::Setting | Role::Place);
         let all = COVARIATES.iter().filter(set);
         let all = all.map(|c| Axis { covariate: c, past: Some(past.clone()) });

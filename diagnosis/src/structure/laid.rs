@@ -52,8 +52,8 @@ impl Laid {
 #[cfg(test)]
 mod tests {
     use crate::decision::Verdict;
-    use crate::example::{Deviates, rig, table};
     use crate::hypotheses::Options;
+    use crate::tests::{Deviates, rig, table};
     use crate::verdict::diagnose;
 
     /// A reading that jumps by 0.06 N half way, which no cause makes: with every third pass held out, the

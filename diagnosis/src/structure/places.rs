@@ -3,7 +3,9 @@
 use super::axis::{Axis, Past};
 use super::form::Form;
 use super::shapes::ShapeKind;
+use crate::data::range;
 use crate::fit::Problem;
+use crate::scatter::clusters::moments;
 use models::covariate::{COVARIATES, FREQUENCY, Role, SPEED, Scale};
 use std::f64::consts::PI;
 use std::sync::Arc;
@@ -124,14 +126,11 @@ fn remembered(axis: &Axis, part: &Problem) -> Vec<Placed> {
     let largest = part.design.largest_amplitude_m;
     let x: Vec<f64> = part.passes.iter().filter_map(|p| axis.of(p, largest)).collect();
     if axis.covariate.role == Role::Place {
-        let places = part.passes.iter().filter_map(|p| axis.covariate.of(p));
-        let (low, high) = places.fold((f64::INFINITY, f64::NEG_INFINITY), |(a, b), v| (a.min(v), b.max(v)));
+        let [low, high] = range(part.passes.iter().filter_map(|p| axis.covariate.of(p)));
         let unit = axis.covariate.scaled(1.0, largest);
         return REACHES.map(|share| share * (high - low)).map(|r| (r, Form::Within(r * unit))).to_vec();
     }
-    let n = x.len() as f64;
-    let mean = x.iter().sum::<f64>() / n;
-    let sd = (x.iter().map(|v| (v - mean).powi(2)).sum::<f64>() / n).sqrt();
+    let (mean, sd) = moments(&x);
     let middle = part.passes.iter().filter_map(|p| axis.covariate.of(p)).sum::<f64>() / part.len() as f64;
     vec![(middle, Form::Along(mean, sd))]
 }

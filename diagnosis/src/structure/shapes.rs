@@ -235,8 +235,8 @@ fn families(part: &Problem, past: &Arc<Past>, u: &[f64], prediction: &DVector<f6
 mod tests {
     use super::*;
     use crate::data::Table;
-    use crate::example::{Deviates, rig, table};
     use crate::least_squares::minimise;
+    use crate::tests::{Deviates, rig, table};
     use models::condition::Condition;
 
     /// The best shape of a table whose friction coefficient is times what a pass and the one before make it,
@@ -256,7 +256,7 @@ mod tests {
             crate::noise::settle(&table, &rig(), &mut problem, &crate::scatter::Belief::Judged);
         let fit = minimise(&problem, &[], &[0.0; NUISANCES], &problem.variance, 15);
         let basis = crate::bases::Basis::none(problem.len());
-        let (_, none) = crate::evidence::averaged_over_form(&problem, &fit, &[], &basis);
+        let (_, none) = crate::evidence::averaged_over_form(&problem, &fit.u, &[], &basis);
         let gap = problem.misfit(&none.prediction) - problem.len() as f64;
         (shapes(&problem, &none, &scatter).swap_remove(0), 0.5 * gap)
     }

@@ -108,7 +108,8 @@ impl Problem<'_> {
         let mut cost = self.cost(form, at, variance);
         for _ in 0..ROUNDS {
             let (hessian, gradients) = self.slopes(form, at, variance);
-            let gradient: Vector2<f64> = gradients.iter().sum::<Vector2<f64>>() - prior_slope(at);
+            let gradient: Vector2<f64> = gradients.iter().sum::<Vector2<f64>>()
+                - Vector2::new(0.0, (at[1] - STIFFNESS_PRIOR[0]) / STIFFNESS_PRIOR[1].powi(2));
             let mut step = hessian.try_inverse().map_or_else(Vector2::zeros, |inverse| inverse * gradient);
             if fixed {
                 step = Vector2::new(0.0, gradient[1] / hessian[(1, 1)]);
@@ -178,10 +179,6 @@ fn descended(mut best: (f64, Vector2<f64>), squares: impl Fn(Vector2<f64>) -> f6
         }
     }
     best
-}
-
-fn prior_slope(at: Vector2<f64>) -> Vector2<f64> {
-    Vector2::new(0.0, (at[1] - STIFFNESS_PRIOR[0]) / STIFFNESS_PRIOR[1].powi(2))
 }
 
 fn sum(residuals: &[Vec<f64>]) -> f64 {

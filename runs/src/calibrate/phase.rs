@@ -4,7 +4,7 @@ use super::tables::{Sources, columns};
 use super::{Bench, Common, Issued};
 use crate::say;
 use crate::setup::Setup;
-use calibration::amplitude::vibrometer::{Decoder, sine};
+use calibration::amplitude::vibrometer::{Decoder, amplitude};
 use calibration::phase::{
     Acquisition, PhasePoint, RepeatedShift, Shift, Waveforms, outcome, repeated, shift, write_phases,
 };
@@ -89,8 +89,8 @@ pub fn certified(args: &Args, bench: &dyn Bench) -> miette::Result<Issued> {
         let shown = path.display();
         let found = shift(&waveforms).map_err(|e| miette::miette!("{shown}: {e}"))?;
         let moved =
-            sine(plate_v, rate_hz, frequency_hz, &plate).map_err(|e| miette::miette!("{shown}: {e}"))?;
-        shifts.push((moved.amplitude().metres(), found));
+            amplitude(plate_v, rate_hz, frequency_hz, &plate).map_err(|e| miette::miette!("{shown}: {e}"))?;
+        shifts.push((moved.metres(), found));
     }
     shifts.sort_by(|a, b| a.0.total_cmp(&b.0));
     let mut points = Vec::new();

@@ -90,10 +90,7 @@ pub(super) fn judge(
             };
             return Err(ForceError::LackOfFit { axis, p, remedy });
         }
-        worst = match (worst, p) {
-            (Some(a), Some(b)) => Some(f64::min(a, b)),
-            (a, b) => a.or(b),
-        };
+        worst = [worst, p].into_iter().flatten().reduce(f64::min);
         let [low, high] = ends(readings.iter().map(|r| r.counts[axis as usize]));
         let span = high - low;
         let drift = fit.value(axis, Term::Drift) * (end - start);
