@@ -285,6 +285,32 @@ fn one_flipped_bit_is_told_by_replay_report_recover_and_diagnose() {
     let table = std::fs::read_to_string(out.join("points.csv")).unwrap();
     std::fs::write(out.join("points.csv"), table.replacen("27500", "27600", 1)).unwrap();
     assert!(ask(&["report"], &out).1["damage"].to_string().contains("points.csv and passes.jsonl differ"));
+    // The run was said to be complete.
+    let again = sweep(&plan, &out).arg("--fast").output().unwrap();
+    assert_eq!(again.status.code(), Some(2), "{}", texts(&again).1);
+    let error = documents(&again).pop().unwrap()["error"].to_string();
+    assert!(error.contains("points.csv and passes.jsonl differ: one of them was changed"), "{error}");
+    std::fs::remove_file(out.join("points.csv")).unwrap();
+    assert_eq!(sweep(&plan, &out).arg("--fast").output().unwrap().status.code(), Some(0));
+    assert_eq!(std::fs::read_to_string(out.join("points.csv")).unwrap(), table);
+}
+
+/// A record that was cut and recovered was called a failure, though every cycle in it agrees.
+#[test]
+fn the_replay_of_a_cut_record_holds_once_it_is_recovered() {
+    let folder = tempfile::tempdir().unwrap();
+    let (plan, out) = (plan(folder.path(), 2), folder.path().join("run"));
+    assert_eq!(sweep(&plan, &out).arg("--fast").output().unwrap().status.code(), Some(0));
+    let record = out.join("run-1.mcap");
+    let bytes = std::fs::read(&record).unwrap();
+    std::fs::write(&record, &bytes[..bytes.len() / 2]).unwrap();
+    let replayed = || muprime().args(["--json", "replay"]).arg(&record).output().unwrap();
+    assert_eq!(replayed().status.code(), Some(1));
+    assert!(muprime().arg("recover").arg(&record).output().unwrap().status.success());
+    let (status, found) = (replayed().status.code(), documents(&replayed()).remove(0));
+    assert_eq!((status, &found["holds"]), (Some(0), &true.into()), "{found}");
+    assert!(found["integrity"]["recovered"].as_str().unwrap().contains("is cut"), "{found}");
+    assert_eq!(found["replay"]["equal"], found["replay"]["cycles"]);
 }
 
 /// A table that is cut, empty or gone: every command says so, and the same command puts every pass back and

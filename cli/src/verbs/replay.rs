@@ -25,13 +25,13 @@ struct Found {
     replay: Replay,
     /// What the record has lost, and where.
     integrity: Integrity,
-    /// Every cycle that was written is there, and was decided as recorded.
+    /// Every cycle that is known of is there, and was decided as recorded.
     holds: bool,
 }
 
 /// Runs every cycle of every record of a run again, and compares its decisions with those recorded, bit for
-/// bit. It holds only where the record is whole: of what is missing nothing is known. Refused: a record that
-/// cannot be read, or that lacks what a replay needs.
+/// bit. It holds only where the record is whole, or was made whole by `recover` and no message is known to be
+/// missing. Refused: a record that cannot be read, or that lacks what a replay needs.
 pub fn run(args: Args, json: bool) -> miette::Result<ExitCode> {
     super::there(&args.run, "run or recording")?;
     let (records, gone) = if args.run.is_dir() {
@@ -109,7 +109,7 @@ fn again(path: PathBuf) -> miette::Result<Found> {
     let integrity = entries.integrity().clone();
     // Cycles that the last words count and that never came stand behind the last that did.
     replayed.missing = replayed.missing.max(integrity.missing(CYCLES));
-    let holds = replayed.holds() && integrity.complete();
+    let holds = replayed.holds() && integrity.intact() && integrity.missing.is_empty();
     Ok(Found { record: path, replay: replayed, integrity, holds })
 }
 

@@ -1,5 +1,6 @@
 //! What of a run's folder is no longer what was written. An error is a file or folder that cannot be read.
 
+use super::journal::changed;
 use super::lines::{whole_passes, whole_table};
 use super::{IDENTITY, JOURNAL, POINTS, SUMMARY, is_held, passes_in, records_in, sessions_in};
 use crate::sequence::MeasuredPass;
@@ -53,10 +54,7 @@ pub fn missing_records(path: &Path) -> miette::Result<Vec<String>> {
 pub fn differences(path: &Path, passes: &[MeasuredPass]) -> miette::Result<Vec<String>> {
     let (table, _) = whole_table(&fs::read(path.join(POINTS)).into_diagnostic()?)?;
     let (journal, _) = whole_passes(&fs::read(path.join(JOURNAL)).into_diagnostic()?)?;
-    let differ = passes.iter().filter(|p| table.iter().any(|k| k.point == p.pass.point && *k != p.pass));
-    let mut findings: Vec<String> = differ
-        .map(|p| format!("point {}: {POINTS} and {JOURNAL} differ: one of them was changed", p.pass.point))
-        .collect();
+    let mut findings: Vec<String> = changed(&table, passes).collect();
     let points = |all: &mut dyn Iterator<Item = u64>| all.collect::<BTreeSet<u64>>();
     let rows = points(&mut table.iter().map(|row| row.point));
     let lost = points(&mut journal.iter().map(|p| p.pass.point)).difference(&rows).count();

@@ -73,9 +73,18 @@ fn agree(path: &Path, table: &[Pass], journal: &[MeasuredPass]) -> miette::Resul
     }
 }
 
+/// The points whose line in the table is not what the journal holds, in a sentence each.
+pub(super) fn changed(table: &[Pass], journal: &[MeasuredPass]) -> impl Iterator<Item = String> {
+    let differ = |p: &&MeasuredPass| table.iter().any(|k| k.point == p.pass.point && *k != p.pass);
+    let words = |p: &MeasuredPass| {
+        format!("point {}: {POINTS} and {JOURNAL} differ: one of them was changed", p.pass.point)
+    };
+    journal.iter().filter(differ).map(words)
+}
+
 /// Puts the passes into the table that the journal alone holds: after a crash between the two the last one,
 /// of a table that was cut or lost all that it lacks. None of them is driven again. A point that the table
-/// alone holds is an error.
+/// alone holds, or holds otherwise, is an error.
 pub(super) fn restore(
     path: &Path,
     table: &mut Placed,
@@ -84,6 +93,16 @@ pub(super) fn restore(
 ) -> miette::Result<()> {
     let passes = once(journal);
     agree(path, made, &passes)?;
+    if let Some(what) = changed(made, &passes).next() {
+        miette::bail!(
+            help = format!(
+                "take {POINTS} and {JOURNAL} from a copy of the folder; or, if {JOURNAL} is right, remove {POINTS}: the \
+                 same command writes it again"
+            ),
+            "{}: {what}",
+            path.display()
+        );
+    }
     let known: BTreeSet<u64> = made.iter().map(|k| k.point).collect();
     let lost: Vec<Pass> =
         passes.into_iter().map(|p| p.pass).filter(|pass| !known.contains(&pass.point)).collect();
