@@ -117,7 +117,7 @@ fn rate_text(s: Spread) -> String {
 fn in_turn(instructions: Instructions, name: &str, strain: Strain) {
     let avx512 = instructions == Instructions::Avx512;
     let mut ridge = Ridge::new(strain, false, 1500);
-    ridge.body.use_instructions(instructions);
+    ridge.body.instructions = instructions;
     let mut twin = ridge.twin(Variant::plain(strain, avx512));
     ridge.turn();
     twin.run(STEPS, 0);

@@ -285,16 +285,6 @@ impl Common {
     }
 
     fn certify(&self, outcome: Outcome, raw: RawData) -> miette::Result<Issued> {
-        self.certify_with(outcome, raw, [])
-    }
-
-    /// The same with more to say in JSON.
-    fn certify_with(
-        &self,
-        outcome: Outcome,
-        raw: RawData,
-        more: impl IntoIterator<Item = (&'static str, serde_json::Value)>,
-    ) -> miette::Result<Issued> {
         let origin = raw.origin.clone();
         let certificate = outcome.certify(&self.occasion(raw)?);
         // What `check` would refuse is not issued.
@@ -303,6 +293,6 @@ impl Common {
             self.serial.chars().map(|c| if c.is_ascii_alphanumeric() { c } else { '-' }).collect();
         let out =
             self.out.clone().unwrap_or_else(|| PathBuf::from(format!("{}-{safe}.toml", certificate.kind)));
-        Ok(Issued { certificate, more: more.into_iter().collect(), out, overwrite: self.overwrite })
+        Ok(Issued { certificate, more: Vec::new(), out, overwrite: self.overwrite })
     }
 }

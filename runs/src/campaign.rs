@@ -48,7 +48,6 @@ pub struct CampaignFile {
     /// Blocks, as days: every cell is measured once in each.
     pub blocks: u32,
     /// Repeats of every condition in a session, in place of the plan's.
-    #[serde(default, skip_serializing_if = "Option::is_none")]
     pub replicates: Option<u32>,
     /// Change of relative friction up to which a factor does not matter (1).
     #[serde(default = "margin")]
@@ -66,10 +65,8 @@ pub struct Cell {
     /// Setup: a bundled name, or a file beside this one.
     pub setup: String,
     /// Fingertip in place of the setup's: a name of the library, or a file beside the setup.
-    #[serde(default, skip_serializing_if = "Option::is_none")]
     pub tip: Option<String>,
     /// Coulomb friction coefficient to expect, in place of the tip's.
-    #[serde(default, skip_serializing_if = "Option::is_none")]
     pub mu0: Option<f64>,
     /// Condition of the tip, as dry or moist: for record and page.
     #[serde(default)]

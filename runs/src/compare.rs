@@ -91,13 +91,9 @@ impl Paired {
     /// The condition in words.
     pub fn setting(&self) -> String {
         let speed = self.speed_m_s * f64::from(self.direction);
-        let [w, f] = [quantity(self.amplitude_pp_m, "m"), quantity(self.frequency_hz, "Hz")];
-        let load = quantity(self.normal_force_n, "N");
-        [w, f, quantity(speed, "m/s"), load]
-            .into_iter()
-            .chain(air_words(&self.air))
-            .collect::<Vec<_>>()
-            .join(", ")
+        let (w, f, load) = (self.amplitude_pp_m, self.frequency_hz, self.normal_force_n);
+        let all = [(w, "m"), (f, "Hz"), (speed, "m/s"), (load, "N")].map(|(v, unit)| quantity(v, unit));
+        all.into_iter().chain(air_words(&self.air)).collect::<Vec<_>>().join(", ")
     }
 
     /// The difference in standard deviations.

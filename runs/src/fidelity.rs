@@ -114,10 +114,8 @@ pub struct Group {
     /// Root-mean-square difference of `mu'` once that way is taken out.
     pub rms_shifted: f64,
     /// The same with the known delay taken out; none where no dynamics are known.
-    #[serde(default)]
     pub rms_known: Option<f64>,
     /// The same with the mean way of the other passes taken out; none of a single pass.
-    #[serde(default)]
     pub rms_held_out: Option<f64>,
     /// How late loop and plate, and the sensor, come beside what is known; empty with a feedback, and where
     /// the target does not show it.

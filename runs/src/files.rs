@@ -118,6 +118,19 @@ pub fn make_folder(path: &Path) -> miette::Result<Vec<PathBuf>> {
     Ok(made)
 }
 
+/// Files and folders that this process has made, the outermost first; where nothing comes of them they go.
+#[derive(Default)]
+pub struct Made(pub Vec<PathBuf>);
+
+impl Drop for Made {
+    fn drop(&mut self) {
+        for path in self.0.iter().rev() {
+            // Only an empty folder goes: another process may have put something there.
+            let _ = if path.is_dir() { fs::remove_dir(path) } else { fs::remove_file(path) };
+        }
+    }
+}
+
 /// An open file that knows its place: another program may remove or replace it at any time, and what is then
 /// written goes nowhere.
 #[derive(Debug)]

@@ -50,16 +50,12 @@ pub struct FingertipSetup {
     #[serde(default, skip_serializing_if = "std::ops::Not::not")]
     pub nobody_touches_the_plate: bool,
     /// Overrides, N/m.
-    #[serde(default, skip_serializing_if = "Option::is_none")]
     pub normal_stiffness_n_per_m: Option<f64>,
     /// Overrides, N/m.
-    #[serde(default, skip_serializing_if = "Option::is_none")]
     pub lateral_stiffness_n_per_m: Option<f64>,
     /// Overrides, relative.
-    #[serde(default, skip_serializing_if = "Option::is_none")]
     pub stiffness_relative_sd: Option<f64>,
     /// Overrides.
-    #[serde(default, skip_serializing_if = "Option::is_none")]
     pub mu0: Option<f64>,
 }
 

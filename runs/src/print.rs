@@ -14,6 +14,7 @@ use std::fmt::Write as _;
 use std::io::{self, Write};
 use std::sync::{Condvar, Mutex, MutexGuard, PoisonError};
 use std::time::Duration;
+use textwrap::{WordSeparator, WordSplitter, WrapAlgorithm};
 
 /// A line on standard output.
 #[macro_export]
@@ -330,39 +331,20 @@ pub const COLUMNS: usize = 80;
 /// The lines of a text folded between words at [`COLUMNS`]; what goes on stands so many columns further in
 /// than its line began. A word that is longer stays whole: a path can be copied.
 pub fn folded(text: &str, hang: usize) -> String {
-    let mut lines = Vec::new();
-    for line in text.lines() {
-        let own = line.len() - line.trim_start().len();
-        let mut now = " ".repeat(own);
-        let mut empty = true;
-        for (gap, word) in words(line.trim_start()) {
-            if !empty && now.chars().count() + gap + word.chars().count() > COLUMNS {
-                lines.push(std::mem::replace(&mut now, " ".repeat(own + hang)));
-                empty = true;
-            }
-            if !empty {
-                now.push_str(&" ".repeat(gap));
-            }
-            now.push_str(word);
-            empty = false;
-        }
-        lines.push(now);
-    }
-    lines.join("\n")
-}
-
-/// The words of a line, each with the blanks before it: columns stay columns.
-fn words(line: &str) -> Vec<(usize, &str)> {
-    let (mut all, mut gap) = (Vec::new(), 0);
-    for part in line.split(' ') {
-        if part.is_empty() {
-            gap += 1;
-        } else {
-            all.push((gap, part));
-            gap = 1;
-        }
-    }
-    all
+    let fold = |line: &str| {
+        let words = line.trim_start();
+        let own = " ".repeat(line.len() - words.len());
+        let further = " ".repeat(own.len() + hang);
+        let options = textwrap::Options::new(COLUMNS)
+            .initial_indent(&own)
+            .subsequent_indent(&further)
+            .break_words(false)
+            .word_separator(WordSeparator::AsciiSpace)
+            .word_splitter(WordSplitter::NoHyphenation)
+            .wrap_algorithm(WrapAlgorithm::FirstFit);
+        textwrap::fill(words, options)
+    };
+    text.lines().map(fold).collect::<Vec<_>>().join("\n")
 }
 
 /// Whether a character changes what is read without being seen: a control character, or a mark that turns the

@@ -9,7 +9,7 @@ mod lines;
 mod lock;
 mod record_facts;
 
-use crate::files::{self, Placed, write_plain};
+use crate::files::{self, Made, Placed, write_plain};
 use crate::plan::Point;
 use crate::sequence::MeasuredPass;
 use crate::session::Notes;
@@ -95,26 +95,7 @@ pub struct RunDir {
     identity: Identity,
     /// A pass could not be stored: half a line may stand at the end, and nothing may follow it.
     failed: bool,
-    new: New,
-}
-
-/// What this process has put into the file system, and takes back where nothing comes of it.
-#[derive(Default)]
-struct New {
-    paths: Vec<PathBuf>,
-    begun: bool,
-}
-
-impl Drop for New {
-    fn drop(&mut self) {
-        if self.begun {
-            return;
-        }
-        for path in self.paths.iter().rev() {
-            // Only an empty folder goes: another process may have put something there.
-            let _ = if path.is_dir() { fs::remove_dir(path) } else { fs::remove_file(path) };
-        }
-    }
+    new: Made,
 }
 
 impl Identity {
@@ -169,17 +150,17 @@ impl RunDir {
                 "{shown} is not empty and holds no run"
             );
         }
-        let mut new = New { paths: files::make_folder(path)?, begun: false };
+        let mut new = Made(files::make_folder(path)?);
         let lock_file = path.join(lock::NAME);
         if !lock_file.exists() {
-            new.paths.push(lock_file.clone());
+            new.0.push(lock_file.clone());
         }
         let lock = claim(&lock_file)?;
         let notes = identity.notes.clone().or(&before_notes);
         Self::open_locked(path, Identity { notes, ..identity.clone() }, lock, new)
     }
 
-    fn open_locked(path: &Path, identity: Identity, lock: File, mut new: New) -> miette::Result<Self> {
+    fn open_locked(path: &Path, identity: Identity, lock: File, mut new: Made) -> miette::Result<Self> {
         let mut header = Vec::new();
         pass::write_passes(&[], &mut header).into_diagnostic()?;
         let text = toml::to_string(&identity).into_diagnostic()?;
@@ -187,7 +168,7 @@ impl RunDir {
         for (name, bytes) in [(IDENTITY, text.as_bytes()), (JOURNAL, b""), (POINTS, &header)] {
             let file = path.join(name);
             if !file.exists() {
-                new.paths.push(file.clone());
+                new.0.push(file.clone());
                 write_plain(&file, bytes)?;
             }
         }
@@ -222,7 +203,7 @@ impl RunDir {
 
     /// Keeps the folder, whatever comes.
     pub fn stay(&mut self) {
-        self.new.begun = true;
+        self.new.0.clear();
     }
 
     /// Plans the session that comes now. In wall-clock time the run's time continues from the start of its
@@ -354,6 +335,12 @@ pub fn sessions_in(path: &Path) -> miette::Result<Vec<Session>> {
         serde_json::from_str(line).map_err(|e| miette::miette!("{}: line {}: {e}", file.display(), i + 1))
     };
     crate::input::text_of(&file)?.lines().enumerate().map(read).collect()
+}
+
+/// When a run's first session began, by the wall clock, UTC.
+pub fn began(path: &Path) -> miette::Result<Option<String>> {
+    let first = sessions_in(path)?.first().map(|first| (first.start_unix_ns / 1_000_000_000) as i64);
+    Ok(first.map(calibration::certificate::date::format))
 }
 
 /// A power cut may leave part of a line at the end: it was never acknowledged and is cut off.

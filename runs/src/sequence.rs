@@ -126,21 +126,25 @@ pub struct Sequence {
     approach: Approach,
     started: bool,
     poisson_ratio: f64,
-    temperature_ranges: Vec<TemperatureRange>,
+    /// Certificates that are compared with the amplifier's temperature at the start of each pass.
+    pub(crate) temperature_ranges: Vec<TemperatureRange>,
     temperature_flags: Vec<TemperatureFlag>,
     /// What the setup states of the air, and what the loop last received of it.
     ambient: Ambient,
     ambient_sent: Ambient,
     at_rig: AtRig,
     has_watchdog: bool,
-    guards: Guards,
+    /// What is reported at each arming.
+    pub(crate) guards: Guards,
     exposure_left: Option<Left>,
     load_commanded: bool,
-    pause_max: Nanos,
+    /// The longest pause.
+    pub(crate) pause_max: Nanos,
     /// The stop of a pause is on its way: the trip that shows it ends nothing.
     pausing: bool,
-    session: Option<u64>,
-    start_s: f64,
+    /// The session of a run that had begun so long before the loop's time zero: passes tell the run's time.
+    pub(crate) session: Option<u64>,
+    pub(crate) start_s: f64,
 }
 
 impl Sequence {
@@ -186,23 +190,6 @@ impl Sequence {
         }
     }
 
-    /// The same in air of which the setup states this; what a plan or a channel says of it goes first.
-    pub fn in_air(self, ambient: Ambient) -> Self {
-        Sequence { ambient, ..self }
-    }
-
-    /// The same, as a session of a run that had begun `start_s` before the loop's time zero, in s: passes
-    /// tell the run's time.
-    pub fn in_session(self, session: u64, start_s: f64) -> Self {
-        Sequence { session: Some(session), start_s, ..self }
-    }
-
-    /// The same, with certificates that are compared with the amplifier's temperature at the start of each
-    /// pass.
-    pub fn watching(self, temperature_ranges: &[TemperatureRange]) -> Self {
-        Sequence { temperature_ranges: temperature_ranges.to_vec(), ..self }
-    }
-
     /// The same, with the limits of the rig that is armed: missing guards are reported then.
     pub fn guarded_by(self, limits: &Limits) -> Self {
         Sequence {
@@ -212,11 +199,6 @@ impl Sequence {
             approach: Approach::at(limits.timing.cycle, &limits.timing.stage),
             ..self
         }
-    }
-
-    /// The same, with the guards that are reported at each arming, and the longest pause in s.
-    pub fn on_rig(self, guards: Guards, pause_max_s: f64) -> Self {
-        Sequence { guards, pause_max: Nanos::from_seconds(pause_max_s), ..self }
     }
 
     /// The first arming reports what is left to a human finger of the hour.
@@ -511,7 +493,7 @@ impl Sequence {
         let c = self.points[self.next].condition;
         out.commands.push(self.slide(&c, Phase::Measure));
         self.sums = Sums::default();
-        self.at_rig.begin_pass();
+        self.at_rig.over = Default::default();
         self.check_temperature(row, out);
         self.stage = Stage::Measure { since: row.now };
     }

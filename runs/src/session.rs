@@ -28,6 +28,7 @@ use models::target::Target;
 use realtime::clock::HeldBack;
 use realtime::compare::Agreement;
 use realtime::pacing::LoopReport;
+use realtime::ports::Nanos;
 use realtime::stall_monitor::StallReport;
 use serde::{Deserialize, Serialize};
 use std::collections::BTreeMap;
@@ -79,7 +80,6 @@ pub struct Notes {
 
 impl Notes {
     /// These, and where they say nothing those of an earlier session.
-    #[must_use]
     pub fn or(self, before: &Notes) -> Notes {
         let or = |now: Option<String>, before: &Option<String>| now.or_else(|| before.clone());
         Notes {
@@ -354,13 +354,15 @@ impl Job {
             &self.setup.tip,
             self.setup.file.noise,
         )
-        .watching(&self.setup.certificates.temperature_ranges)
-        .in_air(self.setup.file.stated_air())
         .at_rig(&self.plan, &self.setup)
-        .guarded_by(&self.setup.config.limits)
-        .on_rig(self.setup.guards(), self.setup.file.limits.pause_max_s.unwrap_or(PAUSE_MAX_S))
+        .guarded_by(&self.setup.config.limits);
+        sequence.temperature_ranges.clone_from(&self.setup.certificates.temperature_ranges);
+        sequence.guards = self.setup.guards();
+        let pause_max_s = self.setup.file.limits.pause_max_s.unwrap_or(PAUSE_MAX_S);
+        sequence.pause_max = Nanos::from_seconds(pause_max_s);
+        sequence.session = Some(session.session);
         // In virtual time the loop's own time goes on from session to session.
-        .in_session(session.session, if self.fast { 0.0 } else { session.start_s });
+        sequence.start_s = if self.fast { 0.0 } else { session.start_s };
         for pass in &dir.made {
             sequence.remember(pass);
         }
@@ -421,7 +423,7 @@ impl Job {
         config.finger.stiffness_relative_sd = 0.0;
         let mut world = sim::world::World::new(&config, self.seed).map_err(wrong)?;
         if virtual_rig.hand_holds {
-            world.operator.holds_dead_man_from = Some(realtime::ports::Nanos(200_000_000));
+            world.operator.holds_dead_man_from = Some(Nanos(200_000_000));
         }
         Ok(world)
     }

@@ -60,19 +60,15 @@ pub struct SetupFile {
     pub stage: InstrumentSetup,
     /// The second switch-off channel: an output that cuts the amplifier's supply, with readback. It is proved
     /// before every arming. A human finger, and an amplifier without a watchdog of its own, need one.
-    #[serde(default, skip_serializing_if = "Option::is_none")]
     pub supply_relay: Option<InstrumentSetup>,
     /// Emergency stop, interlock and dead-man device, as digital inputs. A human finger needs the first and the last.
-    #[serde(default, skip_serializing_if = "Option::is_none")]
     pub safety_inputs: Option<InstrumentSetup>,
     /// The chamber around the rig, or gauges of the air that only read. It takes no part in the loop.
-    #[serde(default, skip_serializing_if = "Option::is_none")]
     pub chamber: Option<InstrumentSetup>,
     /// What the operator sets of the air.
     #[serde(default)]
     pub ambient: crate::ambient::AmbientSetup,
     /// The vibrometer's controller, whose settings calibrations read back; it takes no part in a run.
-    #[serde(default, skip_serializing_if = "Option::is_none")]
     pub vibrometer: Option<VibrometerSetup>,
     /// Soft limits; what is left out keeps its default.
     #[serde(default)]
@@ -89,19 +85,14 @@ pub struct SetupFile {
     pub certificates: Vec<PathBuf>,
     /// Temperature at the instruments in deg C, as read at the bench: a certificate that holds within a range
     /// of temperatures asks for it.
-    #[serde(default, skip_serializing_if = "Option::is_none")]
     pub temperature_c: Option<f64>,
     /// Ambient pressure in Pa, where a plan does not set it.
-    #[serde(default, skip_serializing_if = "Option::is_none")]
     pub ambient_pressure_pa: Option<f64>,
     /// Relative humidity in per cent, as read at the bench.
-    #[serde(default, skip_serializing_if = "Option::is_none")]
     pub relative_humidity_pct: Option<f64>,
     /// Standard uncertainty of the stage's speed, relative, where an encoder or a timed stroke gives it.
-    #[serde(default, skip_serializing_if = "Option::is_none")]
     pub speed_gain_sd: Option<f64>,
     /// Zero of the force channels in counts, lateral and normal, where it is not the force certificate's.
-    #[serde(default, skip_serializing_if = "Option::is_none")]
     pub zero_counts: Option<[f64; 2]>,
     /// Present: this is a virtual rig, served on its instruments' loopback addresses by `muprime run` itself.
     #[serde(default, rename = "virtual")]

@@ -128,14 +128,12 @@ pub struct NotOff {
 
 impl OffReport {
     /// A rig that was read back off.
-    #[must_use]
     pub fn off() -> Self {
         OffReport { read_back: true, not_read_back: Vec::new() }
     }
 
     /// From how the links were closed. A supply that was read back open switches the drive off, whatever its
     /// amplifier shows; one that was not takes nothing from an amplifier that was read back off.
-    #[must_use]
     pub fn of(ends: &[LinkEnd]) -> Self {
         let cut = ends.iter().any(|end| end.role == Role::Supply && end.closed == Closed::ReadBackOff);
         let not_off = |end: &LinkEnd| match &end.closed {
@@ -154,7 +152,6 @@ impl OffReport {
     }
 
     /// The message to whoever stands at the rig.
-    #[must_use]
     pub fn words(&self) -> String {
         if self.read_back {
             return "the drive is off: read back".into();

@@ -24,7 +24,7 @@ fn second(rig: &mut VirtualRig, from_ms: u64) {
         black_box(rig.read(now));
         let _ = black_box(Amplifier::state(rig, now));
         let _ = black_box(Stage::state(rig, now));
-        let world = rig.world_mut();
+        let world = &mut rig.world;
         world.command_amplifier(AmplifierInput {
             amplitude: PeakToPeak::from_metres(2e-6),
             frequency_hz: 27_500.0,

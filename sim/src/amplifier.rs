@@ -112,7 +112,9 @@ pub struct Amplifier {
     fed_at: Nanos,
     watchdog_tripped: bool,
     fault: bool,
-    supply_closed: bool,
+    /// The supply relay is closed, by its mirror contact; the output then stays off until it is commanded on
+    /// anew.
+    pub supply_closed: bool,
     temperature_c: f64,
     /// Drive that its amplitude control has reached (m), and when.
     drive_m: f64,
@@ -177,16 +179,6 @@ impl Amplifier {
             self.supply_closed = false;
             self.output_on = false;
         }
-    }
-
-    /// Closes the supply relay: the output stays off until it is commanded on anew.
-    pub fn close_supply(&mut self) {
-        self.supply_closed = true;
-    }
-
-    /// Whether the supply relay is closed, by its mirror contact.
-    pub const fn supply_closed(&self) -> bool {
-        self.supply_closed
     }
 
     /// Moves on to `now`; returns the drive (m peak-to-peak at resonance) and its frequency (Hz).

@@ -102,18 +102,10 @@ impl Finger {
         speed_m_s: f64,
         normal_force_n: f64,
     ) -> Contact {
-        let mut contact = Contact::ideal(
-            self.normal_stiffness_n_per_m,
-            self.lateral_stiffness_n_per_m,
-            self.mu0,
-            normal_force_n,
-            sine_amplitude_m,
-            frequency_hz,
-            speed_m_s,
-        );
-        contact.ridge = self.ridge;
-        contact.recovery = self.recovery;
-        contact
+        let (kn, kl) = (self.normal_stiffness_n_per_m, self.lateral_stiffness_n_per_m);
+        let ideal =
+            Contact::ideal(kn, kl, self.mu0, normal_force_n, sine_amplitude_m, frequency_hz, speed_m_s);
+        Contact { ridge: self.ridge, recovery: self.recovery, ..ideal }
     }
 }
 

@@ -41,7 +41,8 @@ pub struct Plate {
     config: PlateConfig,
     re: f64,
     im: f64,
-    warming_k: f64,
+    /// Warming above the room (K).
+    pub warming_k: f64,
     map: Transition,
 }
 
@@ -110,11 +111,6 @@ impl Plate {
         // Far below a picometre nothing is left to feel; a true zero spares the contact its smallest numbers.
         let pp = self.re.hypot(self.im);
         if pp < 1e-13 { 0.0 } else { pp }
-    }
-
-    /// Warming above the room (K).
-    pub fn warming_k(&self) -> f64 {
-        self.warming_k
     }
 }
 

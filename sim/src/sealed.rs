@@ -23,7 +23,7 @@ pub mod imitate;
 pub mod oracle;
 pub mod rough;
 
-use crate::defects::{ALL, Defect, DefectKind, Defects};
+use crate::defects::{ALL, Defect, DefectKind, Defects, compatible};
 use crate::noise::Noise;
 pub use bench::SetNoise;
 use bench::{Bench, GAP};
@@ -83,9 +83,9 @@ impl Stratum {
             return vec![first];
         }
         loop {
-            let pair = vec![first, pool[noise.below(pool.len())]];
-            if pair[1].name != first.name && oracle::all_compatible(&pair) {
-                return pair;
+            let second = pool[noise.below(pool.len())];
+            if second.name != first.name && compatible(second, first) {
+                return vec![first, second];
             }
         }
     }

@@ -17,7 +17,8 @@ use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
 
 /// A world with the loop's three ports.
 pub struct VirtualRig {
-    world: World,
+    /// The world behind the ports.
+    pub world: World,
 }
 
 impl VirtualRig {
@@ -27,21 +28,6 @@ impl VirtualRig {
     /// A configuration that cannot be, by name.
     pub fn new(config: &WorldConfig, seed: u64) -> Result<Self, ConfigError> {
         Ok(Self { world: World::new(config, seed)? })
-    }
-
-    /// A rig on a world that is there already.
-    pub fn of(world: World) -> Self {
-        Self { world }
-    }
-
-    /// The world behind the ports.
-    pub fn world(&self) -> &World {
-        &self.world
-    }
-
-    /// The world behind the ports, to change the room or to repair something.
-    pub fn world_mut(&mut self) -> &mut World {
-        &mut self.world
     }
 
     /// Three ports that share the world.
@@ -116,15 +102,15 @@ impl SupplySwitch for VirtualRig {
     fn command(&mut self, command: SupplyCommand, now: Nanos) {
         self.world.advance_to(now);
         match command {
-            SupplyCommand::Cut => self.world.cut_supply(),
-            SupplyCommand::Restore => self.world.close_supply(),
+            SupplyCommand::Cut => self.world.amplifier.cut_supply(),
+            SupplyCommand::Restore => self.world.amplifier.supply_closed = true,
         }
     }
 
     fn state(&mut self, now: Nanos) -> Result<SupplyState, NoData> {
         self.world.advance_to(now);
         let taken_at = self.world.now();
-        Ok(SupplyState { cut: !self.world.supply_closed(), taken_at, sequence: taken_at.0 as u32 })
+        Ok(SupplyState { cut: !self.world.amplifier.supply_closed, taken_at, sequence: taken_at.0 as u32 })
     }
 }
 

@@ -78,7 +78,8 @@ pub struct World {
     finger: Finger,
     pad: Pad,
     plate: Plate,
-    amplifier: Amplifier,
+    /// The amplifier, and the relay in its supply: a wire of its own, whatever its link does.
+    pub amplifier: Amplifier,
     sensor: Sensor,
     stage: Stage,
     /// The air around the rig, and its chamber.
@@ -93,7 +94,8 @@ pub struct World {
     pass_factor: f64,
     contact_time_s: f64,
     truth: Truth,
-    hung: Forces,
+    /// Dead weights that hang on the force sensor: true forces from the next tick on (N).
+    pub hung: Forces,
     known_pp_m: f64,
     forces: Gate<ForceSample>,
     amplifier_states: Gate<AmplifierStatus>,
@@ -171,7 +173,7 @@ impl World {
         let dt = self.tick_s;
         self.room.step(self.now.seconds(), dt);
         let room_c = self.room.of(Air::Temperature);
-        let (drive, frequency) = self.amplifier.step(self.now, room_c, self.plate.warming_k());
+        let (drive, frequency) = self.amplifier.step(self.now, room_c, self.plate.warming_k);
         let known_pp = self.plate.step(drive, frequency, dt);
         self.known_pp_m = known_pp;
         self.stage.step(dt);
@@ -190,7 +192,7 @@ impl World {
             frequency_hz: frequency,
             normal_force_n: normal,
             ambient_pressure_pa: self.room.of(Air::Pressure),
-            temperature_c: room_c + self.plate.warming_k(),
+            temperature_c: room_c + self.plate.warming_k,
         };
         let (pp, steady) = self.meet(&at, known_pp, velocity.abs(), dt);
         let limit = steady.lateral_force_n * self.pass_factor;
@@ -291,26 +293,6 @@ impl World {
         if self.stage_states.open(self.now) {
             self.stage.command(input);
         }
-    }
-
-    /// Opens the amplifier's supply relay: a wire of its own, whatever its link does.
-    pub fn cut_supply(&mut self) {
-        self.amplifier.cut_supply();
-    }
-
-    /// Closes the supply relay, by its own wire: nothing is driven until it is commanded anew.
-    pub fn close_supply(&mut self) {
-        self.amplifier.close_supply();
-    }
-
-    /// Whether the supply relay is closed, by its mirror contact.
-    pub fn supply_closed(&self) -> bool {
-        self.amplifier.supply_closed()
-    }
-
-    /// Hangs dead weights on the force sensor, as an operator does at the bench: true forces from the next tick on (N).
-    pub fn hang(&mut self, lateral_n: f64, normal_n: f64) {
-        self.hung = Forces { lateral_n, normal_n };
     }
 
     /// What a vibrometer beside the finger sees: the true motion of the free plate at the stage's place, peak-to-peak (m).

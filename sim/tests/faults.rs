@@ -34,7 +34,7 @@ fn an_amplifier_that_refuses_off_is_stopped_by_its_supply() {
         drive(&mut world, ms, false);
     }
     assert!(world.truth().amplitude_pp_m > 1.9e-6);
-    world.cut_supply();
+    world.amplifier.cut_supply();
     // Ring-down: under 5 % within three time constants of Q / (pi f) = 1.74 ms.
     for ms in 90..96 {
         drive(&mut world, ms, false);

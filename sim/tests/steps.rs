@@ -43,14 +43,9 @@ fn a_hundred_thousand_cycles_allocate_nothing() {
                 (rig.read(now), Amplifier::state(&mut rig, now).is_ok(), Stage::state(&mut rig, now).is_ok());
             let amplitude = PeakToPeak::from_metres(1e-6 * (ms / 5000 % 4) as f64);
             let (frequency_hz, heartbeat) = (27_500.0, ms as u32);
-            rig.world_mut().command_amplifier(AmplifierInput {
-                amplitude,
-                frequency_hz,
-                enable: true,
-                heartbeat,
-            });
+            rig.world.command_amplifier(AmplifierInput { amplitude, frequency_hz, enable: true, heartbeat });
             let velocity_m_s = if ms / 1000 % 2 == 0 { 0.02 } else { -0.02 };
-            rig.world_mut().command_stage(StageInput { velocity_m_s, normal_force_n: 0.25 });
+            rig.world.command_stage(StageInput { velocity_m_s, normal_force_n: 0.25 });
         }
         assert_eq!(COUNT.with(Cell::get) - before, 0);
     }

@@ -9,13 +9,13 @@ pub mod reading;
 pub mod slider;
 pub mod store;
 
-use crate::campaign::measured::ends;
 pub use collapse::collapse;
 use miette::{IntoDiagnostic, miette};
 use models::ridge::study::{Panel, StudyPoint, content_key, fig_9_at};
 use models::ridge::{self, Cycle, RidgeCase, RidgeRun, RunSettings};
 use plot::{Chart, Series, Stated};
 use reading::Reading;
+use runs::report::plots::ends;
 use std::path::Path;
 
 /// What a figure gives: its charts, and how it compares with the paper.
@@ -304,7 +304,7 @@ pub fn parametric_study(study: Study, out: &Path) -> miette::Result<Reproduced> 
     }
     let spread = |panel: Panel| {
         let at_w = |w: f64| {
-            let [least, greatest] = ends(&panel.values().map(|v| at(panel, v, w)));
+            let [least, greatest] = ends(panel.values().map(|v| at(panel, v, w)));
             greatest - least
         };
         [3e-6, 4e-6, 5e-6].map(at_w).into_iter().fold(0.0, f64::max)
@@ -313,7 +313,7 @@ pub fn parametric_study(study: Study, out: &Path) -> miette::Result<Reproduced> 
         "above 2.5 \u{b5}m the modulus moves mu' by at most {:.3} and the normal force by {:.3}; paper: nearly independent of both there",
         spread(Panel::YoungModulus), spread(Panel::NormalForce)
     ));
-    let [least, greatest] = ends(&found.iter().map(|f| f.1.reaction_over_load).collect::<Vec<_>>());
+    let [least, greatest] = ends(found.iter().map(|f| f.1.reaction_over_load));
     lines.push(format!(
         "mean reaction over load: {:.3} to {:.3} over the study (paper: 1, Eq. 4)",
         least, greatest

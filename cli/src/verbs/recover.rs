@@ -31,41 +31,33 @@ pub fn run(args: Args, json: bool) -> miette::Result<ExitCode> {
     let disk = whole.handle()?;
     let found = recorder::recover(damaged, whole);
     let found = found.into_diagnostic().and_then(|found| disk.sync().map(|()| found));
-    match found {
-        Ok(Recovery::Rewritten { messages, found }) => {
+    if !matches!(found, Ok(Recovery::Rewritten { .. })) {
+        fs::remove_file(&part).into_diagnostic()?;
+    }
+    let findings = |found: &Integrity| found.sentences().join("; ");
+    match found? {
+        Recovery::Nothing { found } => {
+            miette::bail!("{}: nothing of a record can be read: {}", shown(), findings(&found))
+        }
+        Recovery::Rewritten { messages, found } => {
             let original = put_in_place(file, &part)?;
             if json {
-                let document = json!({ "recovered": true, "messages": messages, "original": original,
-                    "damaged": found.damaged_places, "because": found.sentences().join("; "), "integrity": found });
-                out!("{document}");
+                answer_json(&json!({ "recovered": true, "messages": messages, "original": original,
+                    "damaged": found.damaged_places, "because": findings(&found), "integrity": found }));
             } else {
                 say!("{}: {messages} messages saved; the original is {}", shown(), original.display());
                 tell(&found);
             }
-            exit(DONE)
         }
-        other => {
-            fs::remove_file(&part).into_diagnostic()?;
-            match other? {
-                Recovery::Nothing { found } => {
-                    miette::bail!(
-                        "{}: nothing of a record can be read: {}",
-                        shown(),
-                        found.sentences().join("; ")
-                    )
-                }
-                Recovery::Whole(found) | Recovery::Rewritten { found, .. } => {
-                    if json {
-                        answer_json(&json!({ "recovered": false, "whole": true, "integrity": found }));
-                    } else {
-                        say!("{}: whole, nothing to do", shown());
-                        tell(&found);
-                    }
-                    exit(DONE)
-                }
-            }
+        Recovery::Whole(found) if json => {
+            answer_json(&json!({ "recovered": false, "whole": true, "integrity": found }));
+        }
+        Recovery::Whole(found) => {
+            say!("{}: whole, nothing to do", shown());
+            tell(&found);
         }
     }
+    exit(DONE)
 }
 
 fn tell(found: &Integrity) {

@@ -13,7 +13,7 @@ use rig::live::{self, Feed};
 use rig::publish::{Broker, Publisher};
 use rig::watch::{Lead, Watch};
 use runs::catalogue::runs_folder;
-use runs::files::make_folder;
+use runs::files::{Made, make_folder};
 use runs::plan::Plan;
 use runs::print::{self, clean, folded};
 use runs::sequence::{Event, Outcome};
@@ -107,8 +107,8 @@ pub fn run(mut args: Args, json: bool) -> miette::Result<ExitCode> {
     }
     let (setup, plan) = (super::setup(&args.setup)?, super::plan(&args.plan)?);
     let seed = args.seed.unwrap_or(plan.file.seed);
-    let folder = Folder::of(args.out.clone(), &plan.file.name)?;
-    let job = job_of(&args, setup, plan, seed, folder.path.clone())?;
+    let (out, _made) = folder(args.out.clone(), &plan.file.name)?;
+    let job = job_of(&args, setup, plan, seed, out)?;
     // An address that is taken is a refusal: nothing was touched yet.
     let (points, followed) = job.points_seen(None)?;
     let mu0 = job.setup.tip.mu0;
@@ -327,40 +327,25 @@ fn job_of(args: &Args, setup: Setup, plan: Plan, seed: u64, out: PathBuf) -> mie
     Ok(Job { setup, plan, seed, model, model_file, defects, out, fast, notes, answers })
 }
 
-/// The folder of a run or campaign. What of it was made here goes again where nothing comes of it.
-struct Folder {
-    path: PathBuf,
-    made: Vec<PathBuf>,
-}
-
-impl Folder {
-    /// The folder that the arguments name; else a new one, by UTC date and time and the plan's name. Runs of
-    /// one second have one each: the second would go on with the first.
-    fn of(named: Option<PathBuf>, plan: &str) -> miette::Result<Self> {
-        if let Some(path) = named {
-            return Ok(Folder { path, made: Vec::new() });
-        }
-        let now = calibration::certificate::date::format((unix_ns() / 1_000_000_000) as i64);
-        let plain = plan.replace(|c: char| matches!(c, '/' | '\\') || c.is_control(), "-");
-        let name = format!("{}-{plain}", now.replace(['-', ':', 'Z'], "").replace('T', "-"));
-        let mut made = make_folder(&runs_folder())?;
-        let (mut path, mut n) = (runs_folder().join(&name), 1);
-        while let Err(why) = std::fs::create_dir(&path) {
-            let taken = why.kind() == std::io::ErrorKind::AlreadyExists;
-            taken.then_some(()).ok_or(why).into_diagnostic().wrap_err_with(|| path.display().to_string())?;
-            n += 1;
-            path = runs_folder().join(format!("{name}-{n}"));
-        }
-        made.push(path.clone());
-        Ok(Folder { path, made })
+/// The folder of a run or campaign that the arguments name; else a new one, by UTC date and time and the
+/// plan's name. Runs of one second have one each: the second would go on with the first.
+fn folder(named: Option<PathBuf>, plan: &str) -> miette::Result<(PathBuf, Made)> {
+    if let Some(path) = named {
+        return Ok((path, Made::default()));
     }
-}
-
-impl Drop for Folder {
-    fn drop(&mut self) {
-        // Only an empty folder goes.
-        self.made.iter().rev().for_each(|folder| drop(std::fs::remove_dir(folder)));
+    let now = calibration::certificate::date::format((unix_ns() / 1_000_000_000) as i64);
+    let plain = plan.replace(|c: char| matches!(c, '/' | '\\') || c.is_control(), "-");
+    let name = format!("{}-{plain}", now.replace(['-', ':', 'Z'], "").replace('T', "-"));
+    let mut made = Made(make_folder(&runs_folder())?);
+    let (mut path, mut n) = (runs_folder().join(&name), 1);
+    while let Err(why) = std::fs::create_dir(&path) {
+        let taken = why.kind() == std::io::ErrorKind::AlreadyExists;
+        taken.then_some(()).ok_or(why).into_diagnostic().wrap_err_with(|| path.display().to_string())?;
+        n += 1;
+        path = runs_folder().join(format!("{name}-{n}"));
     }
+    made.0.push(path.clone());
+    Ok((path, made))
 }
 
 /// SIGINT, SIGTERM and SIGHUP ask for a stop; a second one leaves within two seconds whatever happens.

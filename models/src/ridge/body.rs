@@ -143,12 +143,16 @@ pub struct Body {
     pub(super) arm: Stress,
     pub(super) laws: Vec<RowLaw>,
     pub(super) rows: ForceRows,
-    pub(super) work: Work,
+    /// Work counted so far (see [`Body::count_energy`]).
+    pub work: Work,
     strain: Strain,
     viscous: bool,
-    stiffness_damping_s: f64,
-    count_energy: bool,
-    pub(super) instructions: Instructions,
+    pub(super) stiffness_damping_s: f64,
+    /// Whether to count work from now on (slower by about a tenth).
+    pub count_energy: bool,
+    /// The instructions of the kernel, for comparisons; what this machine lacks gives the widest it has (ask
+    /// [`Instructions::here`] first).
+    pub instructions: Instructions,
     pub(super) layers: Vec<Layer>,
     /// Steps of the surface so far.
     pub(super) clock: usize,
@@ -241,17 +245,6 @@ impl Body {
         &self.mesh
     }
 
-    /// Whether to count work from now on (slower by about a tenth).
-    pub fn count_energy(&mut self, on: bool) {
-        self.count_energy = on;
-    }
-
-    /// Chooses the instructions of the kernel, for comparisons; what this machine lacks gives the widest it
-    /// has (ask [`Instructions::here`] first).
-    pub fn use_instructions(&mut self, instructions: Instructions) {
-        self.instructions = instructions;
-    }
-
     /// Index of the node in column `i` of row `j`.
     pub fn node(&self, i: usize, j: usize) -> usize {
         j * self.stride + i
@@ -319,11 +312,6 @@ impl Body {
         self.stress.shear[e] = stress[2];
     }
 
-    /// Work counted so far (see [`Body::count_energy`]).
-    pub fn work(&self) -> Work {
-        self.work
-    }
-
     /// Energies now. Kinetic energy is that of the half step after the stresses.
     pub fn energy(&self) -> Energy {
         let mut energy = Energy::default();
@@ -371,11 +359,6 @@ impl Body {
         self.stiffness_damping_s = beta_s;
         self.viscous = true;
         self.arm = Stress::zeros(self.length.len());
-    }
-
-    /// Stiffness-proportional damping in s.
-    pub fn stiffness_damping_s(&self) -> f64 {
-        self.stiffness_damping_s
     }
 
     /// Advances `count` steps of `dt` seconds (of the surface, see [`Body::move_in_longer_steps`]). `contact` sees the surface in each.

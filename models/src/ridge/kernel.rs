@@ -258,7 +258,7 @@ fn element_row<S: Simd, const OBJECTIVE: bool, const VISCOUS: bool>(
             let (x1, x2, x3, x4) = (at(&x, 0), at(&x, 1), at(&x, 2), at(&x, 3));
             let (y1, y2, y3, y4) = (at(&y, 0), at(&y, 1), at(&y, 2), at(&y, 3));
             let (dx13, dy13, dx24, dy24) = (x1 - x3, y1 - y3, x2 - x4, y2 - y4);
-            let half_over_area = one.over(dx13.cross(dy24, dx24, dy13));
+            let half_over_area = one / dx13.cross(dy24, dx24, dy13);
             [dx13, dy13, dx24, dy24, half_over_area, (x1 + x3) - (x2 + x4), (y1 + y3) - (y2 + y4)]
         } else {
             let [a, b, c, d, e, f, g] = fixed;
@@ -296,11 +296,11 @@ fn element_row<S: Simd, const OBJECTIVE: bool, const VISCOUS: bool>(
         let stiffness = dt * pick(hourglass);
         qx = stiffness.mul_add(warp_x, qx);
         qy = stiffness.mul_add(warp_y, qy);
-        mean[k] = m.raw();
-        difference[k] = d.raw();
-        shear[k] = s.raw();
-        hourglass_x[k] = qx.raw();
-        hourglass_y[k] = qy.raw();
+        mean[k] = m.v;
+        difference[k] = d.v;
+        shear[k] = s.v;
+        hourglass_x[k] = qx.v;
+        hourglass_y[k] = qy.v;
 
         // Artificial bulk viscosity: linear always, quadratic in compression.
         let l = pick(length);
@@ -315,9 +315,9 @@ fn element_row<S: Simd, const OBJECTIVE: bool, const VISCOUS: bool>(
             let am = decay.mul_add(pick(arm_mean), gain * mean_step);
             ad = decay.mul_add(ad, gain * d_step);
             as_ = decay.mul_add(as_, gain * s_step);
-            arm_mean[k] = am.raw();
-            arm_difference[k] = ad.raw();
-            arm_shear[k] = as_.raw();
+            arm_mean[k] = am.v;
+            arm_difference[k] = ad.v;
+            arm_shear[k] = as_.v;
             m += am;
             d += ad;
             s += as_;
@@ -330,14 +330,14 @@ fn element_row<S: Simd, const OBJECTIVE: bool, const VISCOUS: bool>(
         let sxy_y = hqx.neg_mul_add(qy, half * s);
         let (p_x, p_y) = (dy24.cross(sxx, dx24, sxy_x), dy24.cross(sxy_y, dx24, syy));
         let (r_x, r_y) = (dx13.cross(sxy_x, dy13, sxx), dx13.cross(syy, dy13, sxy_y));
-        left_x[k] = (pick(owed4_x) + (p_x + qx)).raw();
-        left_y[k] = (pick(owed4_y) + (p_y + qy)).raw();
-        right_x[k] = (pick(owed3_x) + (r_x - qx)).raw();
-        right_y[k] = (pick(owed3_y) + (r_y - qy)).raw();
-        owed3_x[k] = (qx - p_x).raw();
-        owed3_y[k] = (qy - p_y).raw();
-        owed4_x[k] = (-(r_x + qx)).raw();
-        owed4_y[k] = (-(r_y + qy)).raw();
+        left_x[k] = (pick(owed4_x) + (p_x + qx)).v;
+        left_y[k] = (pick(owed4_y) + (p_y + qy)).v;
+        right_x[k] = (pick(owed3_x) + (r_x - qx)).v;
+        right_y[k] = (pick(owed3_y) + (r_y - qy)).v;
+        owed3_x[k] = (qx - p_x).v;
+        owed3_y[k] = (qy - p_y).v;
+        owed4_x[k] = (-(r_x + qx)).v;
+        owed4_y[k] = (-(r_y + qy)).v;
     }
 }
 
@@ -371,10 +371,10 @@ fn node_row<S: Simd, const ENERGY: bool>(simd: S, body: &mut Body, j: usize, ste
         let new_x = keep.mul_add(ux, mobility * (outer_x - inner_x));
         let new_y = keep.mul_add(uy, mobility * (outer_y - inner_y));
         let (way_x, way_y) = (half_dt * (ux + new_x), half_dt * (uy + new_y));
-        vx[k] = new_x.raw();
-        vy[k] = new_y.raw();
-        x[k] = (pick(x) + way_x).raw();
-        y[k] = (pick(y) + way_y).raw();
+        vx[k] = new_x.v;
+        vy[k] = new_y.v;
+        x[k] = (pick(x) + way_x).v;
+        y[k] = (pick(y) + way_y).v;
         if ENERGY {
             let mass = Lanes::of(simd, vectors::<S>(&body.mass, start, count)[k]);
             work[0] += inner_x.mul_add(way_x, inner_y * way_y);

@@ -4,7 +4,7 @@
 //! AVX2 and AVX-512 give the same bits; a machine without fused multiply-add rounds differently.
 
 use pulp::{Arch, Simd};
-use std::ops::{Add, AddAssign, Mul, Neg, Sub};
+use std::ops::{Add, AddAssign, Div, Mul, Neg, Sub};
 
 /// Which instructions the kernel uses.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
@@ -45,7 +45,7 @@ impl Instructions {
 #[derive(Clone, Copy)]
 pub(super) struct Lanes<S: Simd> {
     simd: S,
-    v: S::f64s,
+    pub(super) v: S::f64s,
 }
 
 impl<S: Simd> Lanes<S> {
@@ -57,11 +57,6 @@ impl<S: Simd> Lanes<S> {
     #[inline(always)]
     pub(super) fn splat(simd: S, x: f64) -> Self {
         Lanes { simd, v: simd.splat_f64s(x) }
-    }
-
-    #[inline(always)]
-    pub(super) fn raw(self) -> S::f64s {
-        self.v
     }
 
     /// self * b + c.
@@ -80,11 +75,6 @@ impl<S: Simd> Lanes<S> {
     #[inline(always)]
     pub(super) fn cross(self, b: Self, c: Self, d: Self) -> Self {
         c.neg_mul_add(d, self * b)
-    }
-
-    #[inline(always)]
-    pub(super) fn over(self, b: Self) -> Self {
-        Lanes { simd: self.simd, v: self.simd.div_f64s(self.v, b.v) }
     }
 
     #[inline(always)]
@@ -114,6 +104,7 @@ operators! {
     Add add add_f64s;
     Sub sub sub_f64s;
     Mul mul mul_f64s;
+    Div div div_f64s;
 }
 
 impl<S: Simd> AddAssign for Lanes<S> {

@@ -156,7 +156,7 @@ impl Rig {
         let mut body = Body::new(mesh, case.strain);
         body.hold_top();
         body.damp_stiffness(case.stiffness_damping_s);
-        body.count_energy(settings.energy);
+        body.count_energy = settings.energy;
         stability::add_mass(&mut body, plate.penalty(), settings.added_mass);
         let stable = stability::contact_step_s(&body, plate.penalty());
         if let Some(wanted_s) = settings.step_s
@@ -233,7 +233,7 @@ impl Rig {
     }
 
     fn tally(&self) -> Tally {
-        let (energy, work) = (self.body.energy(), self.body.work());
+        let (energy, work) = (self.body.energy(), self.body.work);
         Tally {
             kinetic: energy.kinetic,
             stored: energy.elastic + energy.hourglass,

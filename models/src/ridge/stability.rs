@@ -100,7 +100,7 @@ pub fn contact_step_s(body: &Body, penalty: &[f64]) -> f64 {
     let bare = highest_frequency_rad_s(body, &[]);
     let closed = highest_frequency_rad_s(body, penalty);
     let stiffer = ((closed / bare - 2.0) / 1.0).clamp(0.0, 1.0);
-    let step = match body.stiffness_damping_s() {
+    let step = match body.stiffness_damping_s {
         0.0 => stable_step_s(closed.max(bare)),
         beta => damped_step_s(closed.max(bare), beta),
     };

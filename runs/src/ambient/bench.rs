@@ -38,14 +38,14 @@ pub enum World {
 impl World {
     fn read(&self, at: usize) -> f64 {
         match self {
-            World::Virtual(rig) => rig.rig().world().room.of(AIRS[at]),
+            World::Virtual(rig) => rig.rig().world.room.of(AIRS[at]),
             World::Served(plant) => plant.now().0.measure(QUANTITIES[at]),
         }
     }
 
     fn set(&self, at: usize, value: f64) {
         match self {
-            World::Virtual(rig) => rig.rig().world_mut().room.set(AIRS[at], value),
+            World::Virtual(rig) => rig.rig().world.room.set(AIRS[at], value),
             World::Served(plant) => plant.now().0.command(&[(COMMANDS[at], value)]),
         }
     }

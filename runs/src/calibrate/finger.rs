@@ -138,6 +138,6 @@ pub fn certified(args: &Args) -> miette::Result<Issued> {
     }
     let identified = serde_json::json!({ "elastic": found.modulus, "all_free": found.skin });
     let springs = serde_json::json!(found.springs);
-    let more = [("skin", identified), ("springs", springs)];
-    args.common.certify_with(found.outcome(), sources.raw_data(), more)
+    let more = vec![("skin", identified), ("springs", springs)];
+    Ok(Issued { more, ..args.common.certify(found.outcome(), sources.raw_data())? })
 }

@@ -16,19 +16,15 @@ struct Origin {
     folder: PathBuf,
 }
 
-fn stored(folder: &Path) -> miette::Result<Option<Origin>> {
-    let file = folder.join(ORIGIN);
-    if !file.exists() {
-        return Ok(None);
-    }
-    let read = serde_json::from_str(&input::text_of(&file)?);
-    read.map(Some).map_err(|e| miette::miette!("{}: {e}", file.display()))
-}
-
 /// The folder that the paths of a campaign's text are relative to, by the folder of its results; of a
 /// campaign that an earlier version made the same folder. An error: that folder is gone.
 pub(super) fn of_folder(folder: &Path) -> miette::Result<PathBuf> {
-    let Some(origin) = stored(folder)? else { return Ok(folder.to_path_buf()) };
+    let file = folder.join(ORIGIN);
+    if !file.exists() {
+        return Ok(folder.to_path_buf());
+    }
+    let origin: Origin = serde_json::from_str(&input::text_of(&file)?)
+        .map_err(|e| miette::miette!("{}: {e}", file.display()))?;
     miette::ensure!(
         origin.folder.is_dir(),
         help = format!("name the campaign's own file: `muprime run FILE --out {}`", folder.display()),

@@ -9,8 +9,7 @@ use super::folders::{noise, reference};
 use super::{Reference, Side, air_of, by_condition, set_by};
 use crate::plan::SKIN_MOISTURE;
 use crate::report::RunData;
-use crate::run_dir::sessions_in;
-use calibration::certificate::date;
+use crate::run_dir::began;
 use clap::ValueEnum;
 use miette::WrapErr;
 use models::condition::Ambient;
@@ -189,12 +188,7 @@ fn group_of(folder: &Path, data: &RunData, by: GroupBy) -> miette::Result<String
         GroupBy::Run => folder.file_name().unwrap_or(folder.as_os_str()).to_string_lossy().into(),
         GroupBy::Tip => fact("fingertip"),
         GroupBy::Model => fact("model"),
-        GroupBy::Day => match sessions_in(folder)?.first() {
-            Some(first) => {
-                date::format((first.start_unix_ns / 1_000_000_000) as i64).chars().take(10).collect()
-            }
-            None => "not stated".into(),
-        },
+        GroupBy::Day => began(folder)?.map_or("not stated".into(), |at| at.chars().take(10).collect()),
         GroupBy::Moisture => moisture(data),
     })
 }

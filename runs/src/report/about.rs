@@ -1,16 +1,14 @@
 //! What stands first on a page: when, who, on what, with which rig and which certificates.
 
 use super::human::quantity;
+use crate::run_dir::began;
 use crate::sequence::MeasuredPass;
 use crate::session::Summary;
-use calibration::certificate::date;
 use models::pass::{REVERSED, is_reversed};
 use models::quantity::PeakToPeak;
 use models::rig_file::RigFile;
 use serde::Serialize;
 use std::collections::BTreeMap;
-use std::fs::File;
-use std::io::{BufRead, BufReader};
 use std::path::Path;
 
 /// The summary of a run with what is to be remarked of its passes, as summary.json and `run --json` have it.
@@ -68,15 +66,6 @@ fn load_missed(passes: &[MeasuredPass]) -> Option<String> {
 const NO_REFERENCE: &str =
     "no pass without vibration: mu_0 is that of the model, so measured mu' rests on the model";
 
-/// When a run's first session began, by the wall clock; none where its folder does not say.
-fn began(folder: &Path) -> Option<String> {
-    let file = File::open(folder.join("sessions.jsonl")).ok()?;
-    let mut line = String::new();
-    BufReader::new(file).read_line(&mut line).ok()?;
-    let session: serde_json::Value = serde_json::from_str(&line).ok()?;
-    Some(date::format((session["start_unix_ns"].as_u64()? / 1_000_000_000) as i64))
-}
-
 /// What is known of a run, in the order in which a reader asks.
 pub fn of_run(
     folder: &Path,
@@ -86,7 +75,7 @@ pub fn of_run(
     let fact = |name: &str| facts.get(name).cloned();
     let not_stated = |why: &str| format!("not stated ({why})");
     let mut all = vec![
-        ("date", began(folder).unwrap_or_else(|| not_stated("the folder has no sessions"))),
+        ("date", began(folder).ok().flatten().unwrap_or_else(|| not_stated("the folder has no sessions"))),
         ("operator", fact("operator").unwrap_or_else(|| not_stated("run --operator"))),
         ("sample", fact("sample").unwrap_or_else(|| not_stated("run --sample"))),
     ];

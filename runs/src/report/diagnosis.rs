@@ -166,7 +166,7 @@ fn residuals(result: &Diagnosis, table: &Table, forecasts: &[Forecast]) -> miett
     for c in covariate::COVARIATES {
         let all: Option<Vec<f64>> = table.passes.iter().map(|p| c.of(p).map(|v| c.shown.0 * v)).collect();
         let Some(x) = all else { continue };
-        let (low, high) = ends(x.iter().copied());
+        let [low, high] = ends(x.iter().copied());
         if high - low <= 1e-12 * high.abs().max(1e-12) {
             continue;
         }

@@ -17,6 +17,7 @@ use plotters::coord::types::RangedCoordf64;
 use plotters::element::{Drawable, PointCollection};
 use plotters::prelude::*;
 use plotters_backend::{BackendCoord, DrawingErrorKind};
+use std::borrow::Borrow;
 use std::ops::Range;
 
 /// Colours that stay apart on white, also for colour-blind readers (after Okabe and Ito, the yellow
@@ -45,8 +46,9 @@ fn wrong(e: impl std::fmt::Display) -> miette::Report {
 }
 
 /// The least and the greatest of some values.
-pub(crate) fn ends(values: impl IntoIterator<Item = f64>) -> (f64, f64) {
-    values.into_iter().fold((f64::INFINITY, f64::NEG_INFINITY), |(l, h), v| (l.min(v), h.max(v)))
+pub fn ends(values: impl IntoIterator<Item: Borrow<f64>>) -> [f64; 2] {
+    let none = [f64::INFINITY, f64::NEG_INFINITY];
+    values.into_iter().fold(none, |[low, high], v| [low.min(*v.borrow()), high.max(*v.borrow())])
 }
 
 fn capital(word: &str) -> String {
@@ -80,7 +82,7 @@ impl Span {
     /// Over all of these values with a margin, logarithmic where it may be and they span more than a decade:
     /// within one such an axis has a single label.
     pub fn over(values: impl Iterator<Item = f64>, logarithmic: bool) -> Self {
-        let (low, high) = ends(values);
+        let [low, high] = ends(values);
         if logarithmic && low > 0.0 && high > 10.0 * low {
             let margin = (high / low).powf(0.04);
             return Span::logarithmic(low / margin..high * margin);

@@ -71,26 +71,31 @@ impl Task {
 
 /// What a task waits for now, and since when: the rig to be read back off, the next task to begin, an answer,
 /// a level (and since when it is within its tolerance), a timer.
-#[derive(Clone, Copy, Debug, PartialEq)]
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
 enum Wait {
-    Off { since: Nanos },
+    Off {
+        since: Nanos,
+    },
+    #[default]
     Begin,
-    Answer { since: Nanos },
-    There { since: Nanos, within: Option<Nanos> },
-    Timer { since: Nanos, until: Nanos },
-}
-
-/// What comes once everything was waited for.
-#[derive(Clone, Copy, Debug, PartialEq)]
-enum Then {
-    Pass,
-    End,
+    Answer {
+        since: Nanos,
+    },
+    There {
+        since: Nanos,
+        within: Option<Nanos>,
+    },
+    Timer {
+        since: Nanos,
+        until: Nanos,
+    },
 }
 
 /// What is known of the rig's surroundings, and what is waited for there.
 #[derive(Default)]
 pub(super) struct AtRig {
-    means: OfAir<Option<Means>>,
+    /// Of a quantity that somebody sets and reads: its column holds that, and no other channel's value.
+    pub(super) means: OfAir<Option<Means>>,
     tolerance: OfAir<f64>,
     reached_within_s: f64,
     steps: Vec<Step>,
@@ -103,20 +108,22 @@ pub(super) struct AtRig {
     answer: Option<(String, Source)>,
     tasks: VecDeque<Task>,
     previous: Option<Task>,
-    wait: Option<Wait>,
-    then: Option<Then>,
+    wait: Wait,
+    /// Once everything was waited for the sweep ends; else the next pass comes.
+    ends: bool,
     /// The rig was disarmed for a person.
     pub(super) disarmed: bool,
     repeats: u32,
     begun: bool,
     /// When the rig was last seen off and at rest while a person was at it.
     quiet: Nanos,
-    over: OfAir<Span>,
+    /// What was read during the pass that is under way.
+    pub(super) over: OfAir<Span>,
 }
 
 /// What was read of a quantity during a pass.
 #[derive(Clone, Copy, Debug, Default)]
-struct Span {
+pub(super) struct Span {
     moments: Moments,
     range: Option<[f64; 2]>,
     last: Option<Nanos>,
@@ -200,10 +207,6 @@ impl AtRig {
         Ambient::of(&condition)
     }
 
-    pub(super) fn begin_pass(&mut self) {
-        self.over = OfAir::default();
-    }
-
     /// Takes in what is read during a pass.
     pub(super) fn during_pass(&mut self) {
         for (found, span) in self.found.iter().zip(&mut self.over) {
@@ -244,15 +247,11 @@ impl AtRig {
         levels.extend(self.typed.iter().map(typed));
         levels
     }
-
-    /// Whether a quantity's column is what somebody set and read, and no other channel's.
-    pub(super) fn holds(&self, at: usize) -> bool {
-        self.means[at].is_some()
-    }
 }
 
 impl Sequence {
-    /// The same, for a plan whose levels and steps are waited for at the rig.
+    /// The same, for a plan whose levels and steps are waited for at the rig, in the air that the setup states;
+    /// what the plan or a channel says of it goes first.
     pub fn at_rig(self, plan: &crate::plan::Plan, setup: &crate::setup::Setup) -> Self {
         let (sets, means, tolerances) = (plan.sets_air(), setup.file.means(), &plan.file.tolerances);
         let at_rig = AtRig {
@@ -263,7 +262,7 @@ impl Sequence {
             simulated: setup.file.virtual_rig.is_some(),
             ..AtRig::default()
         };
-        Sequence { at_rig, ..self }
+        Sequence { at_rig, ambient: setup.file.stated_air(), ..self }
     }
 
     /// Which quantities something has to read for this sweep: those that no person types.
@@ -291,7 +290,7 @@ impl Sequence {
         let first = !self.at_rig.begun && self.at_rig.steps(When::Before).next().is_some();
         if first && let Some(point) = self.points.get(self.next) {
             let tasks = self.at_rig.before(&point.condition, row.now);
-            self.wait_for(tasks, Then::Pass, row, out);
+            self.wait_for(tasks, false, row, out);
         }
         self.at_rig.begun = true;
         first
@@ -301,17 +300,17 @@ impl Sequence {
     pub(super) fn waits_at_rig(&mut self, row: &Row, out: &mut Reaction) -> bool {
         let tasks = self.at_rig.before(&self.points[self.next].condition, row.now);
         self.at_rig.begun = true;
-        self.wait_for(tasks, Then::Pass, row, out)
+        self.wait_for(tasks, false, row, out)
     }
 
     /// After the last pass: steps, and then the end.
     pub(super) fn last_steps(&mut self, row: &Row, out: &mut Reaction) -> bool {
         let tasks = self.at_rig.steps(When::After).collect();
-        self.wait_for(tasks, Then::End, row, out)
+        self.wait_for(tasks, true, row, out)
     }
 
     /// Whether there is anything to wait for.
-    fn wait_for(&mut self, tasks: VecDeque<Task>, then: Then, row: &Row, out: &mut Reaction) -> bool {
+    fn wait_for(&mut self, tasks: VecDeque<Task>, ends: bool, row: &Row, out: &mut Reaction) -> bool {
         if tasks.is_empty() {
             return false;
         }
@@ -320,12 +319,10 @@ impl Sequence {
         out.commands.push(Command::Set(Request::default(), self.marker(Phase::Idle)));
         self.sums = Sums::default();
         let a = &mut self.at_rig;
-        (a.tasks, a.then, a.disarmed, a.answer) = (tasks, Some(then), person, None);
+        (a.tasks, a.ends, a.disarmed, a.answer, a.wait) = (tasks, ends, person, None, Wait::Begin);
         if person {
             out.commands.push(Command::Disarm);
-            a.wait = Some(Wait::Off { since: row.now });
-        } else {
-            a.wait = Some(Wait::Begin);
+            a.wait = Wait::Off { since: row.now };
         }
         self.stage = Stage::AtRig;
         true
@@ -334,7 +331,7 @@ impl Sequence {
     pub(super) fn wait_at_rig(&mut self, row: &Row, out: &mut Reaction) {
         // While a person is at the rig it shows itself off and at rest, as a paused one does. Forces are the
         // person's: tips are changed.
-        if self.at_rig.disarmed && !matches!(self.at_rig.wait, Some(Wait::Off { .. })) {
+        if self.at_rig.disarmed && !matches!(self.at_rig.wait, Wait::Off { .. }) {
             let loud = awake(row);
             let quiet = if loud.is_none() { row.now } else { self.at_rig.quiet };
             self.at_rig.quiet = quiet;
@@ -344,8 +341,8 @@ impl Sequence {
             }
         }
         match self.at_rig.wait {
-            None | Some(Wait::Begin) => self.next_task(row, out),
-            Some(Wait::Off { since }) => {
+            Wait::Begin => self.next_task(row, out),
+            Wait::Off { since } => {
                 if is_off(row) && row.now.since(since) >= LIFTED_AFTER {
                     self.at_rig.quiet = row.now;
                     out.events.push(Event::Disarmed {
@@ -356,16 +353,16 @@ impl Sequence {
                     self.finish(out, Outcome::WouldNotArm { blocking: Some(Cause::RefusesOff) });
                 }
             }
-            Some(Wait::Answer { since }) => self.take_answer(row, since, out),
-            Some(Wait::There { since, within }) => self.look_at_level(row, since, within, out),
-            Some(Wait::Timer { since, until }) if row.now >= until => {
+            Wait::Answer { since } => self.take_answer(row, since, out),
+            Wait::There { since, within } => self.look_at_level(row, since, within, out),
+            Wait::Timer { since, until } if row.now >= until => {
                 if let Some(task) = self.at_rig.tasks.front() {
                     let (step, waited_s) = (task.words(), row.now.since(since).seconds());
                     out.events.push(Event::Waited { step, waited_s });
                 }
                 self.done(row, out);
             }
-            Some(Wait::Timer { .. }) => {}
+            Wait::Timer { .. } => {}
         }
     }
 
@@ -380,7 +377,7 @@ impl Sequence {
         if self.at_rig.needs_a_person(&task) {
             self.ask(&task, row, out);
         } else {
-            self.at_rig.wait = Some(Wait::There { since: row.now, within: None });
+            self.at_rig.wait = Wait::There { since: row.now, within: None };
         }
         if let Task::Level(at, wanted) = task {
             self.at_rig.level[at] = None;
@@ -400,7 +397,7 @@ impl Sequence {
         out.question = Some(Question { usual: usual.filter(|_| types.is_some()), level });
         out.events.push(Event::OperatorStep { step: task.words(), types });
         self.at_rig.answer = None;
-        self.at_rig.wait = Some(Wait::Answer { since: row.now });
+        self.at_rig.wait = Wait::Answer { since: row.now };
     }
 
     fn take_answer(&mut self, row: &Row, since: Nanos, out: &mut Reaction) {
@@ -447,7 +444,7 @@ impl Sequence {
                 if let Some(value) = number.filter(|_| needs) {
                     self.at_rig.found[at] = Some(found(value));
                 }
-                self.at_rig.wait = Some(Wait::There { since: row.now, within: None });
+                self.at_rig.wait = Wait::There { since: row.now, within: None };
             }
             Task::Step(step) => {
                 if let (Some(name), Some(value)) = (step.number_name(), number) {
@@ -456,7 +453,7 @@ impl Sequence {
                 // Nobody waits for a finger that is none.
                 if step.wait_s > 0.0 && !self.at_rig.simulated {
                     let until = row.now.plus(Nanos::from_seconds(step.wait_s));
-                    self.at_rig.wait = Some(Wait::Timer { since: row.now, until });
+                    self.at_rig.wait = Wait::Timer { since: row.now, until };
                 } else {
                     self.done(row, out);
                 }
@@ -490,19 +487,18 @@ impl Sequence {
             out.commands.push(Command::Stop);
             return self.finish(out, Outcome::LevelNotReached { quantity, wanted, found });
         }
-        self.at_rig.wait = Some(Wait::There { since, within: now });
+        self.at_rig.wait = Wait::There { since, within: now };
     }
 
     fn go_on(&mut self, row: &Row, out: &mut Reaction) {
-        self.at_rig.wait = None;
-        match self.at_rig.then.take() {
-            Some(Then::End) => self.finish(out, Outcome::Complete),
-            _ if self.at_rig.disarmed => {
-                self.at_rig.disarmed = false;
-                self.arming = self.arming.afresh(true);
-                self.stage = Stage::Arm;
-            }
-            _ => self.begin_next(row, out),
+        self.at_rig.wait = Wait::Begin;
+        if self.at_rig.ends {
+            self.finish(out, Outcome::Complete);
+        } else if std::mem::take(&mut self.at_rig.disarmed) {
+            self.arming = self.arming.afresh(true);
+            self.stage = Stage::Arm;
+        } else {
+            self.begin_next(row, out);
         }
     }
 }

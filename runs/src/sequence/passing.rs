@@ -163,7 +163,11 @@ impl Sequence {
             lateral_force_sd_n: sums.lateral.sd(),
             samples: Some(sums.lateral.count()),
             // The channel's, or none: two thermometers in one column would look like a change.
-            temperature_c: if self.at_rig.holds(1) { air.temperature_c } else { sums.temperature.mean() },
+            temperature_c: if self.at_rig.means[1].is_some() {
+                air.temperature_c
+            } else {
+                sums.temperature.mean()
+            },
             replicate: Some(u64::from(point.replicate)),
             session: self.session,
             // What was rendered has no steady friction: its force is in the record, cycle by cycle.

@@ -34,8 +34,8 @@ fn swept_on(
     let points = plan.points(1, &setup.config.limits, &resolution).unwrap();
     let model: Arc<dyn FrictionModel> = Arc::new(SpringSlider::new(setup.tip.finger).unwrap());
     let mut sequence =
-        Sequence::new(points, plan.file.pass, Arc::clone(&model), &setup.tip, setup.file.noise)
-            .on_rig(Guards::default(), pause_max_s);
+        Sequence::new(points, plan.file.pass, Arc::clone(&model), &setup.tip, setup.file.noise);
+    sequence.pause_max = Nanos::from_seconds(pause_max_s);
     let [force, amplifier, stage] = VirtualRig::new(world, 1).unwrap().split();
     let ports = Ports::new(Box::new(force), Box::new(amplifier), Box::new(stage.clone()));
     // A welded relay would not pass its proof.

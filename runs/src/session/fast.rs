@@ -41,7 +41,7 @@ pub fn run(
             job.setup.file.name
         );
     }
-    let world = VirtualRig::of(job.world()?).split();
+    let world = VirtualRig { world: job.world()? }.split();
     let air = World::Virtual(world[0].clone());
     let mut bench = Bench::open(&sequence, None, Some(air), answers)?;
     let ports = ports_of(&job, world);
@@ -172,7 +172,6 @@ pub fn rehearse(
     let points = plan.points(seed, &setup.config.limits, &resolution)?;
     let mut sequence =
         Sequence::new(points, plan.file.pass, Arc::clone(&model), &setup.tip, setup.file.noise)
-            .in_air(setup.file.stated_air())
             .at_rig(plan, setup);
     let [force, amplifier, stage] =
         VirtualRig::new(world, seed).map_err(|e| miette::miette!("the virtual rig: {e}"))?.split();

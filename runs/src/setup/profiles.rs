@@ -329,7 +329,6 @@ impl Setup {
     }
 
     /// The profiles of its instruments, and the files that they name, by file name: for the record.
-    #[must_use]
     pub fn profiles(&self) -> Vec<(String, String)> {
         let mut files = BTreeMap::new();
         for instrument in self.instruments().all() {
@@ -349,7 +348,6 @@ impl Setup {
 
     /// What identifies the setup: its text, and what it names that does not come with the program: profiles,
     /// certificates, the fingertip's values.
-    #[must_use]
     pub fn sha256(&self) -> String {
         let instruments = self.instruments();
         let sources = instruments.all().filter_map(|instrument| instrument.source.as_ref());

@@ -31,7 +31,6 @@ impl VirtualLoop {
     }
 
     /// The same, with a loop time that goes on from an earlier session's.
-    #[must_use]
     pub fn from(self, start: Nanos) -> Self {
         VirtualLoop { start, ..self }
     }

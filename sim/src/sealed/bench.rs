@@ -33,7 +33,7 @@ pub(super) struct Bench {
     pub(super) scatter: SetNoise,
     config: FingerConfig,
     /// Stated over true scatter: nobody knows his own repeatability exactly.
-    stated: f64,
+    pub(super) stated: f64,
     warming_k: f64,
     warming_time_s: f64,
     thermometer: bool,
@@ -86,11 +86,6 @@ impl Bench {
             warming_time_s: noise.log_between(40.0, 500.0),
             thermometer: noise.chance(0.6),
         }
-    }
-
-    /// States the repeatability too small by a factor, and else exactly.
-    pub(super) fn exactly_stated(&mut self, too_small: f64) {
-        self.stated = 1.0 / too_small;
     }
 
     /// The true circumstances of planned passes.

@@ -4,7 +4,7 @@
 //! The baseline here is this world's own ideal contact. Recalibration means: stiffnesses and mu0 refitted,
 //! the stiffnesses under their stated scatter, by Gauss-Newton steps on their logarithms.
 
-use crate::defects::{Defect, DefectKind, Defects, compatible};
+use crate::defects::{Defect, Defects};
 use crate::finger::Finger;
 use crate::world::{Point, steady_forces};
 
@@ -181,11 +181,6 @@ impl Case<'_> {
         let prior: f64 = (0..2).map(|k| ((theta[k] + step[k]) / self.stiffness_sd).powi(2)).sum();
         residual.sum::<f64>() + prior
     }
-}
-
-/// Whether a list of kinds can act together in this world.
-pub(super) fn all_compatible(kinds: &[&'static DefectKind]) -> bool {
-    kinds.iter().enumerate().all(|(i, a)| kinds[..i].iter().all(|b| compatible(a, b)))
 }
 
 /// Solves a small symmetric positive system of the first `n` unknowns by elimination; `None` where it is singular.

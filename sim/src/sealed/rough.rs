@@ -80,7 +80,7 @@ pub fn rough(seed: u64, kind: Option<&'static DefectKind>, roughness: Roughness)
     one_clock(&mut planned, design.pace_s);
     let mut bench = Bench::draw(&mut noise, seed);
     bench.scatter.tail = 0.0;
-    bench.exactly_stated(if roughness == Roughness::Understated { UNDERSTATED } else { 1.0 });
+    bench.stated = if roughness == Roughness::Understated { 1.0 / UNDERSTATED } else { 1.0 };
     let seen = bench.circumstances(&planned, true, &mut noise);
     let defects = kind.map_or_else(Defects::none, |kind| bench.sized(&[kind], &seen, GAP, &mut noise));
     let truth = bench.noise_free(&seen, &defects);

@@ -11,7 +11,6 @@ macro_rules! named {
             pub const ALL: &[$type] = &[$($type::$item),+];
 
             /// The name that profiles use.
-            #[must_use]
             pub const fn name(self) -> &'static str {
                 match self { $($type::$item => $name,)+ }
             }

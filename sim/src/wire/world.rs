@@ -2,6 +2,7 @@
 
 use super::{Command, Plant, Quantity};
 use crate::amplifier::AmplifierInput;
+use crate::defects::Forces;
 use crate::room::Air;
 use crate::stage::StageInput;
 use crate::world::World;
@@ -113,7 +114,7 @@ impl Plant for WorldPlant {
     fn advance(&mut self, now: Nanos) {
         // Whatever was hung since the last look has been there since then.
         let [lateral_n, normal_n] = self.hands.bench().hung_n;
-        self.world.hang(lateral_n, normal_n);
+        self.world.hung = Forces { lateral_n, normal_n };
         // The earlier of the two first.
         while let Some(due) = [&self.guard, &self.supply_guard].iter().filter_map(|g| g.due()).min()
             && due < now
@@ -121,7 +122,7 @@ impl Plant for WorldPlant {
             self.world.advance_to(due);
             if self.supply_guard.due() == Some(due) {
                 self.supply_guard.lapsed = true;
-                self.world.cut_supply();
+                self.world.amplifier.cut_supply();
             } else {
                 self.guard.lapsed = true;
                 self.motion = AT_REST;
@@ -170,7 +171,7 @@ impl Plant for WorldPlant {
             Quantity::StageFault => truth(stage.is_some_and(|s| s.fault)),
             Quantity::StageCount => of_stage(|s| f64::from(s.sequence)),
             Quantity::StageTime => of_stage(|s| s.taken_at.seconds()),
-            Quantity::SupplyClosed => truth(self.world.supply_closed()),
+            Quantity::SupplyClosed => truth(self.world.amplifier.supply_closed),
             Quantity::EmergencyStop => truth(!self.world.operator.presses_emergency_stop),
             Quantity::Interlock => truth(!self.world.operator.opens_guard),
             Quantity::DeadMan => {
@@ -199,9 +200,9 @@ impl Plant for WorldPlant {
                 Command::StageHeartbeat => self.guard.beat(value, self.world.now()),
                 Command::SupplyHeartbeat => self.supply_guard.beat(value, self.world.now()),
                 // The switch has a wire of its own: it moves nothing else.
-                Command::CloseSupply if value == 0.0 => self.world.cut_supply(),
+                Command::CloseSupply if value == 0.0 => self.world.amplifier.cut_supply(),
                 Command::CloseSupply if self.supply_guard.lapsed => {}
-                Command::CloseSupply => self.world.close_supply(),
+                Command::CloseSupply => self.world.amplifier.supply_closed = true,
                 Command::AmbientPressure => self.world.room.set(Air::Pressure, value),
                 Command::AirTemperature => self.world.room.set(Air::Temperature, value),
                 Command::RelativeHumidity => self.world.room.set(Air::Humidity, value),

@@ -4,12 +4,13 @@
 //! rises), within the margin (it does not matter), or across it (undecided). A statement is supported or
 //! contradicted by that, never by a difference that is merely not significant.
 
-use super::measured::{Driven, Effect, Measured, contrast, ends, mean};
+use super::measured::{Driven, Effect, Measured, contrast, mean};
 use models::covariate::{self, Covariate};
 use models::prediction::{EmpiricalPsi, FrictionModel, SpringSlider, Validity};
 use models::surrogate::Surrogate;
 use runs::fingertip::FingertipKind;
 use runs::report::human::number;
+use runs::report::plots::ends;
 use serde::Serialize;
 
 /// What a statement expects of a change, or what was found.

@@ -13,6 +13,7 @@ use models::quantity::PeakToPeak;
 use runs::campaign::Session;
 use runs::fingertip::FingertipKind;
 use runs::report::levels::Levels;
+use runs::report::plots::ends;
 use runs::sequence::MeasuredPass;
 use statrs::distribution::{ContinuousCDF, StudentsT};
 use std::collections::BTreeMap;
@@ -153,12 +154,6 @@ fn dot(a: &[f64], b: &[f64]) -> f64 {
 fn without(v: &[f64], along: &[f64]) -> Vec<f64> {
     let share = dot(v, along) / dot(along, along).max(f64::MIN_POSITIVE);
     v.iter().zip(along).map(|(v, a)| v - share * a).collect()
-}
-
-/// The least and the greatest.
-pub fn ends(values: &[f64]) -> [f64; 2] {
-    let start = [f64::INFINITY, f64::NEG_INFINITY];
-    values.iter().fold(start, |[l, h], v| [l.min(*v), h.max(*v)])
 }
 
 /// Passes at equal settings of all other factors, by those settings and the level of this one.

@@ -1,7 +1,7 @@
 //! The page of a campaign: each statement with its answer, each factor with its figure.
 
 use super::claims::{Claim, Trend, claims};
-use super::measured::{Driven, FACTORS, Measured, ends, groups, mean};
+use super::measured::{Driven, FACTORS, Measured, groups, mean};
 use models::condition::Condition;
 use models::covariate::Covariate;
 use models::prediction::{FrictionModel, SpringSlider};
@@ -11,7 +11,7 @@ use runs::campaign::{CampaignFile, sessions};
 use runs::report::html::{escape, head, list, note, shell, table};
 use runs::report::human::number;
 use runs::report::plots::campaign::{Series, against, against_psi};
-use runs::report::plots::mark_name;
+use runs::report::plots::{ends, mark_name};
 use std::fmt::Write;
 
 /// Points of a model's curve.

@@ -48,7 +48,6 @@ pub struct Job {
     #[serde(default = "one")]
     pub window: u64,
     /// Memory that a task may take, bytes; as the engine has it if left out.
-    #[serde(default)]
     pub memory_bytes: Option<u64>,
     /// Time that a task may take, s.
     pub limit_s: f64,

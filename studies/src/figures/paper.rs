@@ -7,7 +7,7 @@ use super::plot::{Chart, Series, Stated};
 use miette::miette;
 use plotters::coord::Shift;
 use plotters::prelude::*;
-use runs::report::plots::{COLOURS, mark};
+use runs::report::plots::{COLOURS, ends, mark};
 use std::path::Path;
 
 /// Widths of one and of two columns, mm.
@@ -100,7 +100,7 @@ fn range(chart: &Chart, y: bool) -> std::ops::Range<f64> {
         _ => Vec::new(),
     });
     let all = drawn.chain(bands).chain(stated).filter(|v| v.is_finite());
-    let (low, high) = all.fold((f64::INFINITY, f64::NEG_INFINITY), |(l, h), v| (l.min(v), h.max(v)));
+    let [low, high] = ends(all);
     let low = if low > 0.0 && low < 0.3 * high { 0.0 } else { low };
     let margin = 0.04 * (high - low).max(1e-12);
     if low == 0.0 { low..high + margin } else { low - margin..high + margin }

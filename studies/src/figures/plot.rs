@@ -2,7 +2,7 @@
 
 use miette::{IntoDiagnostic, WrapErr, miette};
 use plotters::prelude::*;
-use runs::report::plots::COLOURS;
+use runs::report::plots::{COLOURS, ends};
 use std::path::Path;
 
 /// Room for the legend, in pixels.
@@ -96,8 +96,7 @@ impl Chart {
         let points =
             || self.series.iter().flat_map(|s| &s.points).filter(|p| p.0.is_finite() && p.1.is_finite());
         let range = |pick: fn(&(f64, f64)) -> f64| {
-            let (low, high) =
-                points().map(pick).fold((f64::INFINITY, f64::NEG_INFINITY), |(l, h), v| (l.min(v), h.max(v)));
+            let [low, high] = ends(points().map(pick));
             let margin = 0.04 * (high - low).max(1e-12);
             low - margin..high + margin
         };

@@ -1,6 +1,6 @@
 //! `muprime run CAMPAIGN.toml`: the sessions of a campaign that are missing, then its page.
 
-use super::{Args, Folder, job_of, measure, serve};
+use super::{Args, folder as folder_of, job_of, measure, serve};
 use crate::verbs::prelude::*;
 use runs::campaign::{self, Campaign};
 use runs::session::Job;
@@ -28,8 +28,7 @@ pub fn run(mut args: Args, text: &str, folder: &Path, json: bool) -> miette::Res
         Some(_) => why,
         None => tables::check::refusal(why, &file, "campaign"),
     })?;
-    let made = Folder::of(args.out.take().or(resumed), &campaign.file.name)?;
-    let out = made.path.clone();
+    let (out, _made) = folder_of(args.out.take().or(resumed), &campaign.file.name)?;
     let given = args.clone();
     let job = |session: &campaign::Session| -> miette::Result<Job> {
         let cell = &campaign.file.cell[session.cell];

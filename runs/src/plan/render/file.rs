@@ -12,7 +12,6 @@ const MOST_BYTES: usize = 64 << 20;
 
 impl Plan {
     /// What identifies the plan: its text, and its target's file. One that cannot be read is another one.
-    #[must_use]
     pub fn sha256(&self) -> String {
         let render = self.file.render.as_ref().filter(|render| render.file.is_some());
         let file = render.map(|render| std::fs::read(render.path(self)).unwrap_or_default());

@@ -103,7 +103,7 @@ fn part(edges: &[f64], value: f64) -> usize {
 
 fn named(c: &Covariate, edges: &[f64], points: &Table, k: usize) -> String {
     let inside = points.passes.iter().filter_map(|p| c.of(p)).filter(|v| part(edges, *v) == k);
-    let (low, high) = ends(inside);
+    let [low, high] = ends(inside);
     let [low, high] = [low, high].map(|v| number(c.shown.0 * v));
     if low == high { low } else { format!("{low} to {high}") }
 }

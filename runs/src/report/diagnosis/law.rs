@@ -33,7 +33,7 @@ impl Overlay<'_> {
         let passes = &self.table.passes;
         let axis = |c: &'static Covariate| {
             let seen: Vec<f64> = passes.iter().map(|p| c.of(p)).collect::<Option<_>>()?;
-            let (low, high) = ends(seen);
+            let [low, high] = ends(seen);
             let span = Span::over([low, high].into_iter(), c.scale == Scale::Log && low > 0.0);
             let within = |v: f64| v.clamp(low, high);
             (high - low > 1e-3 * high.abs()).then(|| (c, span.places(PLACES as u32).map(within).collect()))
@@ -55,7 +55,7 @@ impl Overlay<'_> {
             (of(&forecasts[i]) - forecasts[i].recalibrated) / self.full(&wanted[i])
         };
         let swing = |k: usize| {
-            let (low, high) = ends((0..PLACES).map(|i| adds(k * PLACES + i, |f| f.corrected)));
+            let [low, high] = ends((0..PLACES).map(|i| adds(k * PLACES + i, |f| f.corrected)));
             high - low
         };
         let Some(k) = (0..axes.len()).max_by(|a, b| swing(*a).total_cmp(&swing(*b))) else {

@@ -87,7 +87,6 @@ impl Answers {
     }
 
     /// Answers on single sets, added up by their kind and truth, in the order in which these come first.
-    #[must_use]
     pub fn summed(all: &[Self]) -> Vec<Self> {
         let mut rows: Vec<Self> = Vec::new();
         for one in all {

@@ -238,15 +238,15 @@ impl Scene {
     fn hands(&self, cycle: u64, world: &SharedRig) {
         for strike in self.strikes.iter().filter(|s| s.at == cycle) {
             let mut rig = world.rig();
-            let mut operator = rig.world().operator;
+            let mut operator = rig.world.operator;
             match ROWS[strike.row].what {
                 What::DeadMan => operator.holds_dead_man_from = None,
                 What::EmergencyStop => operator.presses_emergency_stop = true,
                 What::Guard => operator.opens_guard = true,
-                What::RelayFalls => rig.world_mut().cut_supply(),
+                What::RelayFalls => rig.world.amplifier.cut_supply(),
                 _ => {}
             }
-            rig.world_mut().operator = operator;
+            rig.world.operator = operator;
         }
     }
 
@@ -287,7 +287,7 @@ pub fn run_with(scene: &Scene, keep: bool, core: Core) -> Found {
     let tamper = scene.tampers().filter(|_| !deaf);
     let tampered = |inner| Tampered::new(inner, tamper, &shown);
     let holds_dead_man_from = Some(time_of(20));
-    world.rig().world_mut().operator = Operator { holds_dead_man_from, ..Operator::default() };
+    world.rig().world.operator = Operator { holds_dead_man_from, ..Operator::default() };
     let (supply, contacts) = (world.clone(), world.clone());
     let ports = Ports::new(
         Box::new(FaultyForce::new(tampered(force), &faults, scene.seed)),
@@ -314,8 +314,8 @@ pub fn run_with(scene: &Scene, keep: bool, core: Core) -> Found {
             // The controller stands still; the rig's time goes on.
             for i in 0..ms {
                 let mut rig = world.rig();
-                rig.world_mut().advance_to(time_of(cycle + i));
-                watch.alone(i, rig.world().truth().amplitude_pp_m);
+                rig.world.advance_to(time_of(cycle + i));
+                watch.alone(i, rig.world.truth().amplitude_pp_m);
             }
             paused = ms;
             lateness = time_of(ms);
@@ -349,14 +349,14 @@ pub fn run_with(scene: &Scene, keep: bool, core: Core) -> Found {
             trip.cause = if trip.cause == Cause::Overrun { Cause::Stopped } else { Cause::Overrun };
         }
         if rogue.is_some_and(|at| cycle >= at) && !deaf {
-            world.rig().world_mut().command_amplifier(AmplifierInput {
+            world.rig().world.command_amplifier(AmplifierInput {
                 amplitude: PeakToPeak::from_metres(1.0e-6),
                 frequency_hz: 31_000.0,
                 enable: true,
                 heartbeat: cycle as u32 ^ 0x8000_0000,
             });
         }
-        let truth = world.rig().world().truth().amplitude_pp_m;
+        let truth = world.rig().world.truth().amplitude_pp_m;
         watch.row(cycle, &row, truth, shown.load(Ordering::Relaxed), paused);
         if keep {
             rows.push(row);
