@@ -314,8 +314,8 @@ fn every_step_of_a_person_finds_the_rig_disarmed() {
     let air = World::Virtual(world[0].clone());
     let mut bench = Bench::open(&sequence, None, Some(air), Answers::Simulated).unwrap();
     let [force, amplifier, stage] = world;
-    let ports = realtime::turn::Ports::new(Box::new(force), Box::new(amplifier), Box::new(stage.clone()))
-        .with_supply(Box::new(stage));
+    let ports = realtime::turn::Ports::new(Box::new(force), Box::new(amplifier), Box::new(stage.clone()));
+    let ports = realtime::turn::Ports { supply: Box::new(stage), ..ports };
     let mut rig = VirtualLoop::new(setup.config, model, ports);
     let (mut asked, mut open_rows, mut events, mut passes) = (false, 0, Vec::new(), Vec::new());
     let outcome =

@@ -1,5 +1,7 @@
-//! Helpers that several system tests share: `peer`, `served`, `study`, `waiting`. README.md lists the tests.
+//! Helpers that several system tests share: `contents`, `peer`, `served`, `study`, `waiting`. README.md lists
+//! the tests.
 
+pub mod contents;
 pub mod peer;
 pub mod served;
 pub mod study;

@@ -1,11 +1,12 @@
 //! The record under abuse: cut at every byte, bits flipped.
 
-use realtime::recorder::{self, Contents, Integrity, Recovery};
+use realtime::recorder::{self, Integrity, Recovery};
 use runs::plan::Plan;
 use runs::session::{Job, Signals};
 use runs::setup::Setup;
 use std::io::Cursor;
 use std::sync::{Arc, LazyLock};
+use tests::contents::{Contents, read};
 
 /// A small record of a real sweep in virtual time.
 static RECORD: LazyLock<Vec<u8>> = LazyLock::new(|| {
@@ -33,7 +34,7 @@ static RECORD: LazyLock<Vec<u8>> = LazyLock::new(|| {
 });
 
 fn bodies(bytes: &[u8]) -> Vec<Vec<u8>> {
-    recorder::read(bytes).messages.into_iter().map(|m| m.2).collect()
+    read(bytes).messages.into_iter().map(|m| m.2).collect()
 }
 
 fn recovered(bytes: &[u8]) -> (Recovery, Vec<u8>) {
@@ -47,7 +48,7 @@ fn cut(record: &[u8], step: usize, recover: bool) {
     let whole = bodies(record);
     let mut most = 0;
     for cut in (0..record.len()).step_by(step) {
-        let read = recorder::read(&record[..cut]);
+        let read = read(&record[..cut]);
         let found = read.integrity;
         assert!(found.cut.is_some() && !found.sentences().is_empty(), "cut at {cut}: said to be whole");
         assert!(found.missing.is_empty(), "cut at {cut}: nothing is known of what followed");
@@ -61,7 +62,7 @@ fn cut(record: &[u8], step: usize, recover: bool) {
         match recovered(&record[..cut]) {
             (Recovery::Rewritten { .. }, repaired) => {
                 assert_eq!(bodies(&repaired), read, "cut at {cut}");
-                let after = recorder::read(&repaired).integrity;
+                let after = tests::contents::read(&repaired).integrity;
                 assert!(after.intact() && after.recovered.is_some() && !after.complete(), "cut at {cut}");
             }
             (Recovery::Nothing { .. }, repaired) => assert!(repaired.is_empty()),
@@ -73,7 +74,7 @@ fn cut(record: &[u8], step: usize, recover: bool) {
 
 /// The first rows of the sweep in a record of their own, flushed often, as a young record is.
 fn short() -> Vec<u8> {
-    let read = recorder::read(&RECORD);
+    let read = read(&RECORD);
     let preamble = recorder::Preamble {
         start_unix_ns: 5,
         facts: [("plan".to_string(), "tiny".to_string())].into(),
@@ -126,7 +127,7 @@ fn recovered_files_are_whole_and_hold_what_was_readable() {
 fn an_ordinary_reader_finds_every_message_attachment_and_fact_by_the_index() {
     use mcap::sans_io::indexed_reader::{IndexedReadEvent, IndexedReader, IndexedReaderOptions, ReadOrder};
     for record in [RECORD.clone(), short()] {
-        let read = recorder::read(&record);
+        let read = read(&record);
         let summary = mcap::Summary::read(&record).unwrap().unwrap();
         let options = IndexedReaderOptions::new().with_order(ReadOrder::File);
         let mut reader = IndexedReader::new_with_options(&summary, options).unwrap();
@@ -186,7 +187,7 @@ impl Places {
 /// What a damaged record must still be: damage is said, nothing is invented, and what is known to be missing
 /// is as much as was lost.
 fn judged(damaged: &[u8], whole: &Contents, what: &dyn Fn() -> String) -> Contents {
-    let read = recorder::read(damaged);
+    let read = read(damaged);
     assert!(
         !read.integrity.complete() && !read.integrity.sentences().is_empty(),
         "{}: said to be whole",
@@ -216,7 +217,7 @@ fn judged(damaged: &[u8], whole: &Contents, what: &dyn Fn() -> String) -> Conten
 
 /// Messages of the largest chunk and of the whole.
 fn chunk_of(record: &[u8]) -> usize {
-    let read = recorder::read(record);
+    let read = read(record);
     let most = mcap::Summary::read(record).unwrap().unwrap().chunk_indexes.len();
     // Chunks hold equal shares but for the first and the last: four of them are bounded by this.
     4 * read.messages.len().div_ceil(most)
@@ -231,7 +232,7 @@ fn damages() -> usize {
 
 #[test]
 fn one_flipped_bit_anywhere_is_said_and_costs_one_chunk_at_most() {
-    let whole = recorder::read(&RECORD);
+    let whole = read(&RECORD);
     assert!(whole.integrity.complete());
     let (mut bytes, mut places, chunk) = (RECORD.clone(), Places(1), chunk_of(&RECORD));
     for _ in 0..damages() {
@@ -251,7 +252,7 @@ fn one_flipped_bit_anywhere_is_said_and_costs_one_chunk_at_most() {
 #[test]
 fn every_byte_of_a_short_record_is_watched() {
     let record = short();
-    let whole = recorder::read(&record);
+    let whole = read(&record);
     let mut bytes = record.clone();
     // By default one bit of each byte, another from byte to byte; all eight in `tests/run long`.
     for at in 0..record.len() {
@@ -266,7 +267,7 @@ fn every_byte_of_a_short_record_is_watched() {
 
 #[test]
 fn holes_and_cuts_are_said_and_every_chunk_outside_of_them_is_kept() {
-    let whole = recorder::read(&RECORD);
+    let whole = read(&RECORD);
     let (mut places, chunk) = (Places(2), chunk_of(&RECORD));
     let mut kept = 0;
     for n in 0..damages() / 10 {
@@ -295,7 +296,7 @@ fn holes_and_cuts_are_said_and_every_chunk_outside_of_them_is_kept() {
         match found {
             Recovery::Rewritten { messages, .. } => {
                 assert_eq!(messages, read.messages.len());
-                let after = recorder::read(&repaired);
+                let after = tests::contents::read(&repaired);
                 assert_eq!(after.messages, read.messages);
                 assert_eq!(after.integrity.missing, read.integrity.missing, "what is missing stays known");
                 assert!(after.integrity.intact() && !after.integrity.complete());

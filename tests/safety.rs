@@ -41,9 +41,9 @@ fn rig(defects: &str) -> VirtualLoop {
     let setup = Setup::parse("hand", &text, Path::new(".")).unwrap();
     let world = WorldConfig { defects: Defects::parse(defects).unwrap(), ..WorldConfig::ideal() };
     let [force, amplifier, stage] = VirtualRig::new(&world, 1).unwrap().split();
-    let ports = Ports::new(Box::new(force), Box::new(amplifier), Box::new(stage.clone()))
-        .with_supply(Box::new(stage.clone()))
-        .with_contacts(Box::new(WithoutDevice(stage)));
+    let ports = Ports::new(Box::new(force), Box::new(amplifier), Box::new(stage.clone()));
+    let supply = Box::new(stage.clone());
+    let ports = Ports { supply, contacts: Box::new(WithoutDevice(stage)), ..ports };
     let model = Arc::new(SpringSlider::new(setup.tip.finger).unwrap());
     VirtualLoop::new(setup.config, model, ports)
 }

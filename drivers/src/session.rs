@@ -8,6 +8,7 @@
 use super::ended::{Closed, Ended, OFF_WITHIN};
 use super::endpoint::Endpoint;
 use realtime::clock::{Clock, Participant};
+use realtime::pacing::panic_message;
 use realtime::ports::{Nanos, NoData};
 use std::convert::Infallible;
 use std::panic::AssertUnwindSafe;
@@ -181,11 +182,7 @@ impl Session {
         match std::panic::catch_unwind(AssertUnwindSafe(|| converse(self))) {
             Ok(Ok(never)) => match never {},
             Ok(Err(ended)) => ended,
-            Err(cause) => {
-                let message = cause.downcast_ref::<&str>().map(ToString::to_string);
-                let message = message.or_else(|| cause.downcast_ref::<String>().cloned());
-                Ended::Panicked(message.unwrap_or_else(|| "no words".into()))
-            }
+            Err(cause) => Ended::Panicked(panic_message(&*cause)),
         }
     }
 

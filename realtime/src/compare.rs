@@ -169,7 +169,7 @@ impl Comparator {
             log_evidence: self.test.log_evidence(),
             departed: self.test.alarmed(),
             validity: prediction.validity,
-            judged: self.power.judged(),
+            judged: self.power.judged,
             rms_z: self.power.rms_z(),
             visible_departure: self.power.visible(),
         })

@@ -103,8 +103,8 @@ pub struct Pacing {
     pub spin_ns: u64,
 }
 
-impl From<Option<i32>> for Pacing {
-    fn from(priority: Option<i32>) -> Self {
-        Pacing { priority, ..Pacing::default() }
-    }
+/// The message of a panic.
+pub fn panic_message(cause: &(dyn std::any::Any + Send)) -> String {
+    let text = cause.downcast_ref::<&str>().map(ToString::to_string);
+    text.or_else(|| cause.downcast_ref::<String>().cloned()).unwrap_or_else(|| "no words".into())
 }

@@ -2,7 +2,6 @@
 #![deny(clippy::disallowed_types, clippy::disallowed_methods)]
 
 use crate::cycle::Command;
-use crate::turn::Commands;
 use crossbeam_queue::ArrayQueue;
 use std::sync::atomic::{AtomicBool, Ordering};
 
@@ -54,13 +53,6 @@ impl CommandQueue {
             return Some(Command::Stop);
         }
         self.ring.pop()
-    }
-}
-
-/// The loop's end of a queue.
-impl Commands for &CommandQueue {
-    fn next(&mut self) -> Option<Command> {
-        self.pop()
     }
 }
 

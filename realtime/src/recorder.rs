@@ -28,7 +28,7 @@ use std::io::{Read, Seek, Write};
 
 pub use integrity::{Gap, Integrity, Place};
 pub use read::{Entry, Reader};
-pub use recover::{Contents, Recovery, inspect, read, recover};
+pub use recover::{Recovery, inspect, recover};
 
 /// Topic of the rows, one a cycle.
 pub const CYCLES: &str = "/cycle";

@@ -32,7 +32,7 @@ pub struct Rendered {
 }
 
 /// What is remembered from cycle to cycle while a target is rendered.
-#[derive(Clone, Copy, Debug)]
+#[derive(Clone, Copy, Debug, Default)]
 pub struct Render {
     largest: PeakToPeak,
     last: Option<QuickAnswer>,
@@ -52,16 +52,7 @@ pub const MOST_CORRECTION: f64 = 0.5;
 impl Render {
     /// Rendering up to an amplitude; what an earlier request had reached goes on.
     pub fn up_to(largest: PeakToPeak, before: Option<Render>) -> Self {
-        let begun = Render {
-            largest,
-            last: None,
-            integral: 0.0,
-            wanted: [0.0; MOST_DELAY + 1],
-            next: 0,
-            filled: 0,
-            due: 0.0,
-        };
-        Render { largest, ..before.unwrap_or(begun) }
+        Render { largest, ..before.unwrap_or_default() }
     }
 
     /// What the measurement should show now; `None` before the first wanted value has come through.

@@ -280,14 +280,8 @@ pub struct Safety {
 }
 
 impl Default for Safety {
-    fn default() -> Self {
-        Self::new()
-    }
-}
-
-impl Safety {
     /// Starts faulted: nothing drives before an explicit reset.
-    pub fn new() -> Self {
+    fn default() -> Self {
         let start =
             Trip { cause: Cause::StartUp, value: 0.0, bound: 0.0, unit: Unit::Flag, cycle: 0, at: Nanos(0) };
         Safety {
@@ -300,7 +294,9 @@ impl Safety {
             supply_cut: None,
         }
     }
+}
 
+impl Safety {
     /// Takes over the exposure of earlier runs. Of use before the first cycle only: what is there is replaced.
     pub fn carry(&mut self, past: &Exposed) {
         self.watch.exposure.carry(past);
@@ -357,7 +353,7 @@ impl Safety {
             armed_since,
             now,
         };
-        let broken = rules::first_broken(&context);
+        let broken = rules::first_broken_but(&context, &[]);
         let mut decision = Decision {
             drive: DriveCommand::off(self.sequence, now),
             stage: StageCommand::stop(self.sequence, now),

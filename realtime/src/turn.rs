@@ -28,18 +28,6 @@ impl Ports {
     pub fn new(force: Box<dyn ForceSensor>, amplifier: Box<dyn Amplifier>, stage: Box<dyn Stage>) -> Self {
         Ports { force, amplifier, stage, supply: Box::new(Absent), contacts: Box::new(Absent) }
     }
-
-    /// The same rig with a second switch-off channel.
-    #[must_use]
-    pub fn with_supply(self, supply: Box<dyn SupplySwitch>) -> Self {
-        Ports { supply, ..self }
-    }
-
-    /// The same rig with safety contacts.
-    #[must_use]
-    pub fn with_contacts(self, contacts: Box<dyn SafetyInputs>) -> Self {
-        Ports { contacts, ..self }
-    }
 }
 
 /// One cycle for the record: what came in, what was decided. Plain data, `Copy`.
@@ -117,18 +105,6 @@ impl Row {
     }
 }
 
-/// Where commands come from, oldest first.
-pub trait Commands {
-    /// The next command, if one waits.
-    fn next(&mut self) -> Option<cycle::Command>;
-}
-
-impl<F: FnMut() -> Option<cycle::Command>> Commands for F {
-    fn next(&mut self) -> Option<cycle::Command> {
-        self()
-    }
-}
-
 /// The time of a turn.
 #[derive(Clone, Copy, Debug)]
 pub struct Tick {
@@ -141,18 +117,19 @@ pub struct Tick {
 }
 
 /// One turn: read the ports, decide, command the ports, and only then estimate and compare: a slow model delays no 'off'.
+/// `next_command` gives the commands that wait, oldest first.
 pub fn turn(
     config: &Config,
     model: &dyn FrictionModel,
     state: &mut CycleState,
     ports: &mut Ports,
-    commands: &mut dyn Commands,
+    next_command: &mut dyn FnMut() -> Option<cycle::Command>,
     tick: Tick,
 ) -> Row {
     let Tick { number, lateness, now } = tick;
     let mut taken = [None; COMMANDS_PER_CYCLE];
     for slot in &mut taken {
-        *slot = commands.next();
+        *slot = next_command();
         if slot.is_none() {
             break;
         }

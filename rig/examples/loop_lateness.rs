@@ -39,7 +39,7 @@ impl Stage for Idle {
 
 fn main() {
     let seconds: f64 = std::env::args().nth(1).and_then(|s| s.parse().ok()).unwrap_or(5.0);
-    let mut pacing = Pacing::from(Some(80));
+    let mut pacing = Pacing { priority: Some(80), ..Pacing::default() };
     for option in std::env::args().skip(2) {
         match option.split_once('=') {
             Some(("cpu", cpu)) => pacing.cpu = Some(cpu.parse().expect("a number of a CPU")),

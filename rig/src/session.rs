@@ -82,7 +82,7 @@ fn over_instruments(
     let (rig, handle, rows) = WallLoop::start(Parts {
         config: job.setup.config,
         model: Arc::clone(&job.model),
-        ports: ports.with_supply(rig.supply).with_contacts(rig.contacts),
+        ports: Ports { supply: rig.supply, contacts: rig.contacts, ..ports },
         links: rig.links,
         pacing: job.setup.file.pace.pacing(),
         origin_ns,

@@ -88,7 +88,7 @@ fn crash(step: &(String, u64), plan: &Path, folder: &Path, planned: usize) -> bo
     );
     assert!(promised.is_subset(&unique), "step {n}");
     for record in runs::run_dir::records_in(&out).unwrap() {
-        let read = realtime::recorder::read(&std::fs::read(&record).unwrap());
+        let read = tests::contents::read(&std::fs::read(&record).unwrap());
         // A kill cuts a record and damages nothing: what the file holds of the last write may be torn.
         assert_eq!(read.integrity.damaged_places, 0, "step {n}: {}", record.display());
         assert!(read.integrity.missing.is_empty(), "step {n}: {}", record.display());

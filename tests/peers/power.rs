@@ -97,7 +97,7 @@ fn judge(root: &Path, acknowledged: &BTreeSet<u64>, ended: bool) -> Result<(), S
     }
     if ended {
         let record = std::fs::read(run.join("run-1.mcap")).map_err(|e| format!("the record: {e}"))?;
-        let found = realtime::recorder::read(&record).integrity;
+        let found = tests::contents::read(&record).integrity;
         if !found.complete() {
             return Err(format!("the record: {:?}", found.sentences()));
         }

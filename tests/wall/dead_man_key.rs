@@ -208,7 +208,7 @@ impl Drop for Ledger {
 
 /// Time that earlier runs are said to have driven, in s, by the record of a run: in one go, and in the last hour.
 fn carried_over(run: &Path) -> [f64; 2] {
-    let record = realtime::recorder::read(&std::fs::read(run.join("run-1.mcap")).unwrap());
+    let record = tests::contents::read(&std::fs::read(run.join("run-1.mcap")).unwrap());
     let (_, built) = record.files.iter().find(|(name, _)| name == "loop.json").expect("every record has it");
     let built: serde_json::Value = serde_json::from_slice(built).unwrap();
     let exposed = &built["config"]["exposed"];

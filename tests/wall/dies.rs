@@ -162,7 +162,7 @@ fn struck(setup: &str, signal: i32, wait: Duration, folder: &Path) -> Result<Str
         (last, on) = rig.look();
         std::thread::sleep(Duration::from_millis(1));
     }
-    let record = realtime::recorder::read(&std::fs::read(out.join("run-1.mcap")).unwrap());
+    let record = tests::contents::read(&std::fs::read(out.join("run-1.mcap")).unwrap());
     let events = record.events().map(|event| event["event"].as_str().unwrap_or("?").to_string());
     Ok(((!on).then_some(last - from), events.collect()))
 }

@@ -105,9 +105,11 @@ impl Driven {
         let (rig, reins, _) = WallLoop::start(Parts {
             config,
             model: Arc::new(models::prediction::SpringSlider::new(setup.tip.finger).unwrap()),
-            ports: Ports::new(opened.force, opened.amplifier, opened.stage)
-                .with_supply(opened.supply)
-                .with_contacts(opened.contacts),
+            ports: Ports {
+                supply: opened.supply,
+                contacts: opened.contacts,
+                ..Ports::new(opened.force, opened.amplifier, opened.stage)
+            },
             links: opened.links,
             pacing: setup.file.pace.pacing(),
             origin_ns,

@@ -112,7 +112,7 @@ fn kills() {
                 assert_eq!(unique.len(), kept.len(), "a pass is there twice: {kept:?}");
                 assert!(acknowledged.is_subset(&unique), "acknowledged {acknowledged:?}, kept {kept:?}");
                 for record in runs::run_dir::records_in(&out).unwrap() {
-                    let read = realtime::recorder::read(&std::fs::read(&record).unwrap());
+                    let read = tests::contents::read(&std::fs::read(&record).unwrap());
                     assert_eq!(read.integrity.damaged_places, 0, "{}", record.display());
                 }
             }

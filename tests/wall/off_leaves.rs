@@ -165,9 +165,11 @@ impl Bench {
         let (rig, reins, _) = WallLoop::start(Parts {
             config,
             model: Arc::new(models::prediction::SpringSlider::new(setup.tip.finger).unwrap()),
-            ports: Ports::new(opened.force, opened.amplifier, opened.stage)
-                .with_supply(opened.supply)
-                .with_contacts(opened.contacts),
+            ports: Ports {
+                supply: opened.supply,
+                contacts: opened.contacts,
+                ..Ports::new(opened.force, opened.amplifier, opened.stage)
+            },
             links: opened.links,
             pacing: realtime::pacing::Pacing::default(),
             origin_ns,

@@ -71,7 +71,7 @@ fn a_sweep_over_real_modbus_tcp_ends_with_table_record_and_report() {
         let of_loop = |name: &str| summary["loop_report"][name].as_u64().unwrap();
         assert_eq!(counted, of_loop("cycles") + of_loop("overruns"), "the histogram holds every deadline");
         // The record says the same, with setup, plan and the loop's report inside.
-        let record = realtime::recorder::read(&std::fs::read(out.join("run-1.mcap")).unwrap());
+        let record = tests::contents::read(&std::fs::read(out.join("run-1.mcap")).unwrap());
         assert!(record.integrity.complete(), "{:?}", record.integrity);
         assert_eq!(
             record.rows().count() as u64 + summary["record_lost"].as_u64().unwrap(),
@@ -137,7 +137,7 @@ fn a_killed_record_is_recovered_and_an_ordinary_reader_opens_it() {
         };
         let out = (1..=5).find_map(killed).expect("a machine that is not too busy for wall-clock time");
         let record = out.join("run-1.mcap");
-        let before = realtime::recorder::read(&std::fs::read(&record).unwrap());
+        let before = tests::contents::read(&std::fs::read(&record).unwrap());
         assert!(before.integrity.cut.is_some() && before.integrity.damaged_places == 0);
         let recovered = muprime().args(["--json", "recover"]).arg(&record).output().unwrap();
         assert_eq!(recovered.status.code(), Some(0), "{}", texts(&recovered).1);
@@ -172,7 +172,7 @@ fn an_interrupt_stops_safely_and_keeps_what_was_measured() {
         );
         assert_eq!(rest.last().unwrap()["summary"]["outcome"], "stopped");
         assert!(!points(&out).is_empty());
-        let record = realtime::recorder::read(&std::fs::read(out.join("run-1.mcap")).unwrap());
+        let record = tests::contents::read(&std::fs::read(out.join("run-1.mcap")).unwrap());
         assert!(record.integrity.complete(), "the record was ended properly: {:?}", record.integrity);
         let last = record.rows().last().unwrap();
         assert!(!last.armed && last.drive_pp_m == 0.0 && last.load_n == 0.0 && last.velocity_m_s == 0.0);
@@ -259,7 +259,7 @@ fn a_foreign_instrument_replaying_a_measured_trace_is_recorded_as_it_was() {
             let normal = 0.25 * rows[row][3] / rows[0][3];
             (count(rows[row][2] * normal), count(normal))
         };
-        let record = realtime::recorder::read(&std::fs::read(out.join("run-1.mcap")).unwrap());
+        let record = tests::contents::read(&std::fs::read(out.join("run-1.mcap")).unwrap());
         let (mut distinct, mut oldest) = (std::collections::BTreeSet::new(), 0.0f64);
         for row in record.rows() {
             let (Ok(lateral), Ok(normal)) = (row.inputs.seen.forces.lateral, row.inputs.seen.forces.normal)

@@ -125,7 +125,8 @@ pub(super) struct Power {
     /// Mean of each bet's score under a unit departure, and the score's variance.
     shift: [f64; PULLS],
     information: [f64; PULLS],
-    judged: u32,
+    /// Passes with vibration that were judged.
+    pub judged: u32,
     squares: f64,
 }
 
@@ -154,11 +155,6 @@ impl Power {
             self.squares += z * z;
             self.judged += 1;
         }
-    }
-
-    /// Passes with vibration that were judged.
-    pub(super) const fn judged(&self) -> u32 {
-        self.judged
     }
 
     /// Root mean square of their residuals.

@@ -8,7 +8,7 @@
 use super::machine::{
     ask_for_real_time, keep_cpus_awake, monotonic_ns, pin_to, sleep_until, thread_faults, wait_until,
 };
-use super::{Grants, Lifeline, LoopReport, Pacing};
+use super::{Grants, Lifeline, LoopReport, Pacing, panic_message};
 use crate::clock::Participant;
 use crate::cycle::{Config, CycleState};
 use crate::ports::{Nanos, SupplyCommand};
@@ -69,10 +69,8 @@ impl Grid {
 }
 
 /// Runs the loop on the calling thread until its lifeline says to end. Call it on a thread of its own.
-///
-/// `pacing` is what to ask of the machine; a bare FIFO priority, or `None`, will do.
-pub fn run(parts: LoopParts, pacing: impl Into<Pacing>) -> LoopReport {
-    let pacing = pacing.into();
+/// `pacing` is what to ask of the machine.
+pub fn run(parts: LoopParts, pacing: Pacing) -> LoopReport {
     let LoopParts { config, model, mut ports, commands, mut rows, mut watch, life, origin_ns, held } = parts;
     // On the machine's scale, whichever clock it is.
     let now_ns = || held.as_ref().map_or_else(monotonic_ns, |clock| origin_ns + clock.now().0);
@@ -94,7 +92,6 @@ pub fn run(parts: LoopParts, pacing: impl Into<Pacing>) -> LoopReport {
         grants.pace_refused = Some(format!("/dev/cpu_dma_latency: {why}"));
     }
     let mut state = CycleState::default();
-    let mut take = &*commands;
     let (mut cycles, mut overruns, mut ring_drops, mut watch_drops) = (0u64, 0u64, 0u64, 0u64);
     let mut faults_at_start = (0, 0);
     let mut panicked = None;
@@ -113,12 +110,12 @@ pub fn run(parts: LoopParts, pacing: impl Into<Pacing>) -> LoopReport {
         let tick = Tick { number: cycles, lateness: Nanos(late), now };
         // A port is foreign code: if it panics, the drive goes off before anything else, and the loop ends.
         let turned = std::panic::catch_unwind(AssertUnwindSafe(|| {
-            turn(&config, &*model, &mut state, &mut ports, &mut take, tick)
+            turn(&config, &*model, &mut state, &mut ports, &mut || commands.pop(), tick)
         }));
         let row = match turned {
             Ok(row) => row,
             Err(cause) => {
-                panicked = Some(words_of(&*cause));
+                panicked = Some(panic_message(&*cause));
                 break;
             }
         };
@@ -143,7 +140,7 @@ pub fn run(parts: LoopParts, pacing: impl Into<Pacing>) -> LoopReport {
     }
     switch_off(&mut ports, Nanos(now_ns().saturating_sub(origin_ns)));
     drop(awake);
-    let (minor_faults, major_faults) = faults_between(faults_at_start, thread_faults());
+    let (minor_faults, major_faults) = thread_faults();
     let [half, most, hundredth, thousandth] =
         [0.5, 0.9, 0.99, 0.999].map(|q| lateness_histogram.value_at_quantile(q));
     LoopReport {
@@ -153,8 +150,8 @@ pub fn run(parts: LoopParts, pacing: impl Into<Pacing>) -> LoopReport {
         overruns,
         ring_drops,
         watch_drops,
-        minor_faults,
-        major_faults,
+        minor_faults: minor_faults - faults_at_start.0,
+        major_faults: major_faults - faults_at_start.1,
         lateness_ns: [half, most, hundredth, thousandth, lateness_histogram.max()],
         panicked,
         histogram: lateness_histogram
@@ -180,11 +177,6 @@ fn count_deadlines(histogram: &mut Histogram<u64>, late: u64, missed: u64, perio
     }
 }
 
-/// Minor and major faults from one count of them to a later one.
-const fn faults_between(before: (i64, i64), now: (i64, i64)) -> (i64, i64) {
-    (now.0 - before.0, now.1 - before.1)
-}
-
 /// Commands every port: off, at rest. A port that panics does not stop the others; its instrument then has
 /// its own watchdog and the second channel.
 fn switch_off(ports: &mut Ports, now: Nanos) {
@@ -197,12 +189,6 @@ fn switch_off(ports: &mut Ports, now: Nanos) {
         let cut = AssertUnwindSafe(|| ports.supply.command(SupplyCommand::Cut, now));
         let _ = std::panic::catch_unwind(cut);
     }
-}
-
-/// The message of a panic.
-fn words_of(cause: &(dyn std::any::Any + Send)) -> String {
-    let text = cause.downcast_ref::<&str>().map(ToString::to_string);
-    text.or_else(|| cause.downcast_ref::<String>().cloned()).unwrap_or_else(|| "no words".into())
 }
 
 /// Lateness in ns of a bare absolute sleep of that period, for so long: what the machine itself gives.

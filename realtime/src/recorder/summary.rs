@@ -4,7 +4,7 @@
 //! Format: MCAP specification 0, "Summary section" (<https://mcap.dev/spec>).
 
 use super::{TOPICS, schema};
-use mcap::records::{Record, op};
+use mcap::records::{ChunkIndex, Record, Statistics, op};
 use mcap::{MAGIC, McapError};
 use std::collections::BTreeMap;
 use std::io::{BufReader, Read, Seek, SeekFrom, Write};
@@ -48,53 +48,12 @@ impl Bytes {
     }
 }
 
-/// A chunk, as its index entry describes it.
-#[derive(Default)]
-struct ChunkSeen {
-    first_ns: u64,
-    last_ns: u64,
-    start: u64,
-    length: u64,
-    message_indexes: BTreeMap<u16, u64>,
-    message_index_length: u64,
-    compression: Vec<u8>,
-    compressed: u64,
-    uncompressed: u64,
-}
-
-impl ChunkSeen {
-    fn write(self, to: &mut Vec<u8>) {
-        Bytes::default()
-            .u64(self.first_ns)
-            .u64(self.last_ns)
-            .u64(self.start)
-            .u64(self.length)
-            .map(&self.message_indexes)
-            .u64(self.message_index_length)
-            .text(&self.compression)
-            .u64(self.compressed)
-            .u64(self.uncompressed)
-            .record(op::CHUNK_INDEX, to);
-    }
-}
-
-/// What the statistics say.
-#[derive(Default)]
-struct Counts {
-    messages: BTreeMap<u16, u64>,
-    attachments: u32,
-    metadata: u32,
-    chunks: u32,
-    /// Log times of the first and the last message.
-    bounds_ns: Option<(u64, u64)>,
-}
-
 /// The file from its beginning up to its data's end, record by record.
 struct Walk {
     at: u64,
     end: u64,
-    counts: Counts,
-    chunk: Option<ChunkSeen>,
+    counts: Statistics,
+    chunk: Option<ChunkIndex>,
     /// Index entries of attachments and of metadata: a handful.
     others: [Vec<u8>; 2],
 }
@@ -143,19 +102,21 @@ impl Walk {
         let name = u32::from_le_bytes(head[28..].try_into().expect("four bytes"));
         let mut compression = vec![0; name as usize];
         file.read_exact(&mut compression)?;
+        let compression = String::from_utf8_lossy(&compression).into_owned();
         let mut compressed = [0; 8];
         file.read_exact(&mut compressed)?;
-        self.chunk = Some(ChunkSeen {
-            first_ns: number(0),
-            last_ns: number(8),
-            start: self.at,
-            length,
+        self.chunk = Some(ChunkIndex {
+            message_start_time: number(0),
+            message_end_time: number(8),
+            chunk_start_offset: self.at,
+            chunk_length: length,
+            message_index_offsets: BTreeMap::new(),
+            message_index_length: 0,
             compression,
-            compressed: u64::from_le_bytes(compressed),
-            uncompressed: number(16),
-            ..ChunkSeen::default()
+            compressed_size: u64::from_le_bytes(compressed),
+            uncompressed_size: number(16),
         });
-        self.counts.chunks += 1;
+        self.counts.chunk_count += 1;
         Ok(40 + u64::from(name))
     }
 
@@ -166,12 +127,18 @@ impl Walk {
         let channel = u16::from_le_bytes([head[0], head[1]]);
         let bytes = u32::from_le_bytes(head[2..].try_into().expect("four bytes"));
         if let Some(chunk) = &mut self.chunk {
-            chunk.message_indexes.insert(channel, self.at);
+            chunk.message_index_offsets.insert(channel, self.at);
             chunk.message_index_length += length;
+            let counts = &mut self.counts;
+            if counts.message_count == 0 {
+                counts.message_start_time = chunk.message_start_time;
+            }
+            counts.message_start_time = counts.message_start_time.min(chunk.message_start_time);
+            counts.message_end_time = counts.message_end_time.max(chunk.message_end_time);
             // Each entry: log time and offset.
-            *self.counts.messages.entry(channel).or_default() += u64::from(bytes / 16);
-            let (first, last) = self.counts.bounds_ns.unwrap_or((chunk.first_ns, chunk.last_ns));
-            self.counts.bounds_ns = Some((first.min(chunk.first_ns), last.max(chunk.last_ns)));
+            let count = u64::from(bytes / 16);
+            counts.message_count += count;
+            *counts.channel_message_counts.entry(channel).or_default() += count;
         }
         Ok(6)
     }
@@ -180,7 +147,7 @@ impl Walk {
         let place = Bytes::default().u64(self.at).u64(length);
         match record {
             Record::Attachment { header, data, .. } => {
-                self.counts.attachments += 1;
+                self.counts.attachment_count += 1;
                 place
                     .u64(header.log_time)
                     .u64(header.create_time)
@@ -190,7 +157,7 @@ impl Walk {
                     .record(op::ATTACHMENT_INDEX, &mut self.others[0]);
             }
             Record::Metadata(metadata) => {
-                self.counts.metadata += 1;
+                self.counts.metadata_count += 1;
                 place.text(metadata.name.as_bytes()).record(op::METADATA_INDEX, &mut self.others[1]);
             }
             _ => {}
@@ -198,9 +165,18 @@ impl Walk {
     }
 
     fn close(&mut self, held: &mut Vec<u8>) {
-        if let Some(chunk) = self.chunk.take() {
-            chunk.write(held);
-        }
+        let Some(chunk) = self.chunk.take() else { return };
+        Bytes::default()
+            .u64(chunk.message_start_time)
+            .u64(chunk.message_end_time)
+            .u64(chunk.chunk_start_offset)
+            .u64(chunk.chunk_length)
+            .map(&chunk.message_index_offsets)
+            .u64(chunk.message_index_length)
+            .text(chunk.compression.as_bytes())
+            .u64(chunk.compressed_size)
+            .u64(chunk.uncompressed_size)
+            .record(op::CHUNK_INDEX, held);
     }
 }
 
@@ -263,7 +239,7 @@ pub(super) fn end(file: &mut (impl Read + Write + Seek), data_crc: u32) -> Resul
     summary.write_group(op::CHANNEL, &channels)?;
 
     let at = MAGIC.len() as u64;
-    let mut walk = Walk { at, end, counts: Counts::default(), chunk: None, others: Default::default() };
+    let mut walk = Walk { at, end, counts: Statistics::default(), chunk: None, others: Default::default() };
     let from = summary.at;
     let mut held = Vec::with_capacity(HELD + 1024);
     loop {
@@ -279,17 +255,16 @@ pub(super) fn end(file: &mut (impl Read + Write + Seek), data_crc: u32) -> Resul
     summary.write_group(op::ATTACHMENT_INDEX, &attachments)?;
     summary.write_group(op::METADATA_INDEX, &metadata)?;
     let mut statistics = Vec::new();
-    let (first, last) = counts.bounds_ns.unwrap_or_default();
     Bytes::default()
-        .u64(counts.messages.values().sum())
+        .u64(counts.message_count)
         .u16(TOPICS.len() as u16)
         .u32(TOPICS.len() as u32)
-        .u32(counts.attachments)
-        .u32(counts.metadata)
-        .u32(counts.chunks)
-        .u64(first)
-        .u64(last)
-        .map(&counts.messages)
+        .u32(counts.attachment_count)
+        .u32(counts.metadata_count)
+        .u32(counts.chunk_count)
+        .u64(counts.message_start_time)
+        .u64(counts.message_end_time)
+        .map(&counts.channel_message_counts)
         .record(op::STATISTICS, &mut statistics);
     summary.write_group(op::STATISTICS, &statistics)?;
     footer(summary)

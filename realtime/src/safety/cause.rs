@@ -177,12 +177,8 @@ impl Unit {
         }
     }
 
-    /// A value with its unit, to four significant digits; what is infinite was never seen.
-    pub fn of(self, value: f64) -> String {
-        self.beside(value, value)
-    }
-
-    /// The same in the unit that suits `other`, which is printed beside it: nothing is 0 um beside 0.2 um.
+    /// A value with its unit, to four significant digits; what is infinite was never seen. The unit suits
+    /// `other` too, which is printed beside it: nothing is 0 um beside 0.2 um.
     fn beside(self, value: f64, other: f64) -> String {
         if value == f64::INFINITY {
             return "no data".into();

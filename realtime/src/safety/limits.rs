@@ -254,11 +254,8 @@ impl LimitError {
 impl Range {
     fn check(&self, name: &'static str, value: f64) -> Result<(), LimitError> {
         let Range { low, high, why } = *self;
-        if value >= low && value <= high {
-            Ok(())
-        } else {
-            Err(LimitError::OutOfRange { name, value, low, high, why })
-        }
+        let outside = LimitError::OutOfRange { name, value, low, high, why };
+        if value >= low && value <= high { Ok(()) } else { Err(outside) }
     }
 }
 
@@ -412,9 +409,6 @@ impl Timing {
 }
 
 fn positive(name: &'static str, value: f64) -> Result<(), LimitError> {
-    if value.is_finite() && value > 0.0 {
-        Ok(())
-    } else {
-        Err(LimitError::Unusable { name, value, needed: "a finite number above zero" })
-    }
+    let unusable = LimitError::Unusable { name, value, needed: "a finite number above zero" };
+    if value.is_finite() && value > 0.0 { Ok(()) } else { Err(unusable) }
 }

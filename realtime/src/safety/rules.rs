@@ -47,12 +47,7 @@ pub(super) struct Breach {
     pub unit: Unit,
 }
 
-/// The first broken rule in the order of [`RULES`].
-pub(super) fn first_broken(context: &Context<'_>) -> Option<Breach> {
-    first_broken_but(context, &[])
-}
-
-/// The first broken rule whose cause is not excused.
+/// The first broken rule, in the order of [`RULES`], whose cause is not excused.
 pub(super) fn first_broken_but(context: &Context<'_>, excused: &[Cause]) -> Option<Breach> {
     RULES.iter().filter(|rule| !excused.contains(&rule.cause)).find_map(|rule| {
         (rule.check)(context).map(|(value, bound, unit)| Breach { cause: rule.cause, value, bound, unit })
@@ -184,7 +179,7 @@ fn following(c: &Context<'_>) -> Option<(f64, f64)> {
         return Some((stage.velocity_m_s, 1.5 * c.watch.fastest_m_s + 0.02));
     }
     let since = c.watch.moving_since?;
-    let forwards = stage.velocity_m_s * c.watch.velocity_m_s().signum();
+    let forwards = stage.velocity_m_s * c.watch.velocity_m_s.signum();
     let due = c.now.since(since).0 > STAGE_RESPONSE.0 + c.limits.timing.stage.age_limit().0;
     broken(due && forwards < 0.2 * c.watch.slowest_m_s, forwards, 0.2 * c.watch.slowest_m_s)
 }

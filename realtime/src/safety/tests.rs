@@ -69,7 +69,7 @@ struct Bench {
 impl Bench {
     fn new() -> Self {
         Bench {
-            safety: Safety::new(),
+            safety: Safety::default(),
             limits: limits(),
             request: Request::default(),
             n: 0,
@@ -152,7 +152,7 @@ fn amplifier(seen: &mut Observation) -> &mut AmplifierState {
 
 #[test]
 fn starts_faulted_and_arms_only_on_an_edge_with_all_clear() {
-    let mut safety = Safety::new();
+    let mut safety = Safety::default();
     let limits = limits();
     let off = DriveCommand::off(0, T);
     let request =
@@ -490,7 +490,7 @@ proptest! {
         requests in prop::collection::vec((any::<f64>(), any::<f64>(), any::<f64>(), any::<f64>()), 40),
         times in prop::collection::vec(any::<u64>(), 40),
     ) {
-        let mut safety = Safety::new();
+        let mut safety = Safety::default();
         let limits = limits();
         for (i, (lateral, normal, amplitude, flag, late)) in seen.into_iter().enumerate() {
             let mut observation = healthy(i as u32, &DriveCommand::off(0, T));
@@ -533,7 +533,7 @@ proptest! {
         ], 20..60),
         resets in prop::collection::vec(any::<bool>(), 60),
     ) {
-        let mut safety = Safety::new();
+        let mut safety = Safety::default();
         let limits = limits();
         let mut last = DriveCommand::off(0, T);
         let mut driven = 0;

@@ -195,7 +195,7 @@ pub(super) struct Watch {
     /// Highest amplitude commanded within the last ring-down: measured may still be that high.
     pub ringing_pp_m: f64,
     /// Velocity as last commanded in m/s, and since when its sign and at least its speed stand.
-    velocity_m_s: f64,
+    pub velocity_m_s: f64,
     pub moving_since: Option<Nanos>,
     /// Slowest speed commanded since then, and the fastest within the stage's response time, in m/s.
     pub slowest_m_s: f64,
@@ -343,11 +343,6 @@ impl Watch {
         self.ringing_pp_m = self.ringing_pp_m.max(amplitude);
         self.enabled = drive.enable();
         self.off_since = if drive.enable() { None } else { self.off_since.or(Some(now)) };
-    }
-
-    /// Velocity as last commanded, in m/s.
-    pub(super) const fn velocity_m_s(&self) -> f64 {
-        self.velocity_m_s
     }
 
     /// Whether the amplifier stays on although it has long been commanded off: ten cycles after a fresh state

@@ -71,10 +71,10 @@ fn ports_of(job: &Job, [force, amplifier, stage]: [SharedRig; 3]) -> Ports {
     let ports = Ports::new(Box::new(force), Box::new(amplifier), Box::new(stage.clone()));
     let mut ports = job.setup.certificates.applied(ports);
     if job.setup.file.supply_relay.is_some() {
-        ports = ports.with_supply(Box::new(stage.clone()));
+        ports.supply = Box::new(stage.clone());
     }
     if job.setup.file.safety_inputs.is_some() {
-        ports = ports.with_contacts(Box::new(stage));
+        ports.contacts = Box::new(stage);
     }
     ports
 }

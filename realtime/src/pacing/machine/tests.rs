@@ -1,6 +1,5 @@
 //! The reported grants are compared with what the kernel reports of the thread.
 
-use super::super::Pacing;
 use super::*;
 use std::sync::{Mutex, MutexGuard};
 use std::time::Duration;
@@ -92,12 +91,6 @@ fn a_priority_that_is_none_is_refused_with_the_reason() {
     unsafe { libc::munlockall() };
     assert_eq!((grants.policy.as_str(), grants.priority), ("other", 0));
     assert!(grants.policy_refused.is_some_and(|why| !why.is_empty()));
-}
-
-#[test]
-fn a_bare_priority_asks_for_nothing_else() {
-    let pacing = Pacing::from(Some(7));
-    assert_eq!(pacing, Pacing { priority: Some(7), cpu: None, keep_cpus_awake: false, spin_ns: 0 });
 }
 
 #[test]

@@ -146,7 +146,7 @@ impl Running {
             origin_ns: monotonic_ns(),
             held: None,
         };
-        let thread = std::thread::spawn(move || run(parts, None));
+        let thread = std::thread::spawn(move || run(parts, Pacing::default()));
         Running { scene, queue, life, rows, thread }
     }
 

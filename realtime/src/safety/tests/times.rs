@@ -277,8 +277,7 @@ fn a_stamp_may_be_ahead_by_its_age_limit() {
 /// Counters do not stop at their end.
 #[test]
 fn the_sequence_wraps() {
-    let mut safety = Safety::new();
-    safety.sequence = u32::MAX;
+    let mut safety = Safety { sequence: u32::MAX, ..Safety::default() };
     let seen = healthy(1, &DriveCommand::off(0, T));
     let decision = safety.step(&limits(), &seen, &Request::default(), Controls::default(), T);
     assert_eq!((decision.drive.sequence(), decision.stage.sequence()), (0, 0));

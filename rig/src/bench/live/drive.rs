@@ -60,9 +60,11 @@ impl Drive {
             config: setup.config,
             model: Arc::new(model),
             // The raw set-point is what is calibrated: a certificate of the setup is not applied.
-            ports: Ports::new(rig.force, rig.amplifier, rig.stage)
-                .with_supply(rig.supply)
-                .with_contacts(rig.contacts),
+            ports: Ports {
+                supply: rig.supply,
+                contacts: rig.contacts,
+                ..Ports::new(rig.force, rig.amplifier, rig.stage)
+            },
             links: rig.links,
             pacing: setup.file.pace.pacing(),
             origin_ns,

@@ -126,9 +126,8 @@ fn swept(before: Before) -> (Outcome, Vec<Event>, Vec<Row>) {
     let pressed = Arc::new(AtomicBool::new(false));
     let board = Board { rig: stage.clone(), pressed: Arc::clone(&pressed), stored: None };
     let amplifier = Generator { rig, faulty: before.faulty };
-    let ports = Ports::new(Box::new(force), Box::new(amplifier), Box::new(stage.clone()))
-        .with_supply(Box::new(stage))
-        .with_contacts(Box::new(board));
+    let ports = Ports::new(Box::new(force), Box::new(amplifier), Box::new(stage.clone()));
+    let ports = Ports { supply: Box::new(stage), contacts: Box::new(board), ..ports };
     let rig = VirtualLoop::new(setup.config, model, ports);
     let mut held = Held { rig, before, pressed, now: 0, cycle: 0, proving: 0, proofs: 0 };
     let (mut events, mut rows) = (Vec::new(), Vec::new());

@@ -293,9 +293,8 @@ pub fn run_with(scene: &Scene, keep: bool, core: Core) -> Found {
         Box::new(FaultyForce::new(tampered(force), &faults, scene.seed)),
         Box::new(FaultyAmplifier::new(tampered(amplifier), &faults, scene.seed)),
         Box::new(FaultyStage::new(tampered(stage), &faults, scene.seed)),
-    )
-    .with_supply(Box::new(supply))
-    .with_contacts(Box::new(contacts));
+    );
+    let ports = Ports { supply: Box::new(supply), contacts: Box::new(contacts), ..ports };
     let mut controller = VirtualLoop::new(config, Arc::clone(&model) as Arc<dyn FrictionModel>, ports);
     let mut watch = Watch::new(scene);
     let mut rows = Vec::new();
