@@ -19,7 +19,7 @@ mod imports;
 mod records;
 
 use chance::Chance;
-use instruments::vector::from_hex;
+use instruments::codec::from_hex;
 use std::panic::{AssertUnwindSafe, catch_unwind, resume_unwind};
 use tests::file;
 

@@ -200,9 +200,7 @@ impl Master {
                     let code = word.fold(0_u32, |sum, byte| sum << 8 | u32::from(*byte));
                     session.endpoint.alarm(&format!("emergency {code:#06x}"));
                 }
-                Some(CanEvent::BusOff) => {
-                    return Err(Ended::Io(LEFT.into()));
-                }
+                Some(CanEvent::BusOff) => return Err(Ended::Io(LEFT.into())),
                 Some(CanEvent::Passive) => return Err(Ended::Io(PASSIVE.into())),
                 Some(CanEvent::Warning) => session.endpoint.health().problem(WARNS),
                 _ => {}

@@ -8,9 +8,8 @@ use super::endpoint::BadFrame;
 use super::modbus::{Blocks, Registers, Trouble};
 use super::modbus_tcp::{Tcp, resolve};
 use super::{Ended, InstrumentSetup, OpenError};
-use instruments::profile::FrameKind;
+use instruments::Profile;
 use instruments::schema::{LinkKind, Role};
-use instruments::{FrameId, Profile};
 use realtime::clock::Clock;
 use std::net::SocketAddr;
 use std::sync::atomic::{AtomicBool, Ordering};
@@ -55,13 +54,13 @@ pub struct Chamber {
 pub fn serves(profile: &Profile) -> Result<(), OpenError> {
     let id = profile.id().to_string();
     if !profile.description.profile.roles.contains(&Role::AmbientChamber) {
-        return Err(OpenError::NoChamber(id));
+        return Err(OpenError::Unfit(id, " is not a chamber's: its roles lack `ambient.chamber`"));
     }
     if profile.description.link.kind != LinkKind::ModbusTcp {
-        return Err(OpenError::ChamberLink(id));
+        return Err(OpenError::Unfit(id, ": a chamber is read over Modbus TCP (`kind = \"modbus_tcp\"`)"));
     }
     if QUANTITIES.iter().all(|name| profile.signal(name).is_none()) {
-        return Err(OpenError::NoAir(id));
+        return Err(OpenError::Unfit(id, " has no signal `pressure`, `temperature` or `humidity`"));
     }
     Ok(())
 }
@@ -80,8 +79,6 @@ impl Chamber {
         let mut talk = Talk {
             address: resolve(address, link.port).map_err(|error| at(error.into()))?,
             unit: setup.unit.or(link.unit).unwrap_or(255),
-            connect_ms: link.connect_timeout_ms,
-            answer_ms: link.response_timeout_ms,
             blocks: Blocks::of(&profile),
             profile,
             taken: [None; 3],
@@ -130,8 +127,6 @@ fn lock(shared: &Mutex<Shared>) -> MutexGuard<'_, Shared> {
 struct Talk {
     address: SocketAddr,
     unit: u8,
-    connect_ms: u32,
-    answer_ms: u32,
     profile: Profile,
     blocks: Blocks,
     /// Set-points that the chamber has taken.
@@ -140,7 +135,8 @@ struct Talk {
 
 impl Talk {
     fn connect<'a>(&self, runtime: (&'a Runtime, &'a Clock)) -> Result<Tcp<'a>, Ended> {
-        Tcp::connect(runtime, self.address, self.unit, self.connect_ms, self.answer_ms)
+        let link = &self.profile.description.link;
+        Tcp::connect(runtime, self.address, self.unit, link.connect_timeout_ms, link.response_timeout_ms)
     }
 
     fn go_on(&mut self, runtime: (&Runtime, &Clock), shared: &Mutex<Shared>, ends: &AtomicBool) {
@@ -188,15 +184,13 @@ impl Talk {
 
     fn read(&self, wire: &mut Tcp<'_>) -> Result<[Option<(f64, Instant)>; 3], Ended> {
         let mut values = self.profile.values();
-        for (index, frame) in self.profile.frames().iter().enumerate() {
-            let FrameKind::Poll(poll) = frame.kind else { continue };
-            let table = self.profile.description.poll[poll].table;
+        for (frame, poll) in self.profile.polls() {
             let mut bytes = Vec::new();
-            for span in &frame.spans {
-                let part = wire.read(table, span.address, span.count);
+            for span in &self.profile.frames()[frame.0].spans {
+                let part = wire.read(poll.table, span.address, span.count);
                 bytes.extend(part.map_err(|trouble| Ended::Io(format!("{trouble:?}")))?);
             }
-            let decoded = self.profile.decode(FrameId(index), &bytes, &mut values);
+            let decoded = self.profile.decode(frame, &bytes, &mut values);
             decoded.map_err(|error| BadFrame::Corrupt(error.to_string()))?;
         }
         if let Some(broken) = self.profile.broken_signature(&values) {

@@ -148,23 +148,9 @@ pub enum OpenError {
     /// The same of an instrument beside the loop.
     #[error("`{id}` at {address}: {problem}")]
     Beside { id: String, address: String, problem: Ended },
-    #[error("profile `{0}` is not a chamber's: its roles lack `ambient.chamber`")]
-    NoChamber(String),
-    #[error("profile `{0}`: a chamber is read over Modbus TCP (`kind = \"modbus_tcp\"`)")]
-    ChamberLink(String),
-    /// The chamber reads none of [`chamber::QUANTITIES`].
-    #[error("profile `{0}` has no signal `pressure`, `temperature` or `humidity`")]
-    NoAir(String),
-    /// The setup does not say which of a vibrometer's decoders it means.
-    #[error("`{id}` at {address}: {problem}")]
-    Decoder { id: String, address: String, problem: String },
-    #[error(
-        "`{id}` at {address}: the settings changed while they were read; \
-        let nobody touch the controller and ask again"
-    )]
-    SettingsChanged { id: String, address: String },
-    #[error("profile `{0}` is not that of a vibrometer's controller")]
-    NoVibrometer(String),
+    /// The profile is not that of a chamber or of a vibrometer's controller; what it lacks.
+    #[error("profile `{0}`{1}")]
+    Unfit(String, &'static str),
 }
 
 /// What an instrument is to the rig.
@@ -296,8 +282,7 @@ pub fn profile(id: &str) -> Result<Profile, OpenError> {
         known: bundled::ids().collect::<Vec<_>>().join(", "),
         looked: "no folder".into(),
     })?;
-    Profile::parse_with(text, &|name| bundled::file(name).map(String::from))
-        .and_then(|profile| profile.check(text).map(|()| profile))
+    Profile::checked(text, &|name| bundled::file(name).map(String::from))
         .map_err(|error| OpenError::Profile { id: id.into(), error })
 }
 

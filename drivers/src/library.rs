@@ -87,8 +87,7 @@ impl Source {
     pub fn profile(&self) -> Result<Profile, OpenError> {
         let file =
             |name: &str| self.files.iter().find(|(known, _)| known == name).map(|(_, text)| text.clone());
-        Profile::parse_with(&self.text, &file)
-            .and_then(|profile| profile.check(&self.text).map(|()| profile))
+        Profile::checked(&self.text, &file)
             .map_err(|error| OpenError::Profile { id: self.origin.display().to_string(), error })
     }
 }

@@ -4,7 +4,7 @@ use super::ended::{BAD_IN_A_ROW, Ended};
 use super::endpoint::Due;
 use super::off::{self, OFF_ANSWER_MS, OffWay};
 use super::session::{Periodic, Session};
-use instruments::profile::{FrameKind, Profile, Span};
+use instruments::profile::{Profile, Span};
 use instruments::schema::{Poll, Table, Write};
 use instruments::{FrameId, SetId};
 use std::convert::Infallible;
@@ -37,8 +37,9 @@ pub trait Registers {
     fn wait_up_to(&mut self, answer_ms: u32);
 }
 
-/// A conversation's state: blocks as last sent, and bad answers in a row.
-pub struct Conversation {
+/// A conversation over a wire: blocks as last sent, and bad answers in a row.
+pub struct Conversation<'a> {
+    wire: &'a mut dyn Registers,
     blocks: Blocks,
     bad: u32,
 }
@@ -80,24 +81,23 @@ impl Blocks {
     }
 }
 
-impl Conversation {
+impl<'a> Conversation<'a> {
     /// Reads everything once, so that the signature is judged before anything is commanded.
     ///
     /// # Errors
     /// Why the connection is of no use.
-    pub fn begin(session: &mut Session, wire: &mut dyn Registers) -> Result<Self, Ended> {
-        let mut conversation = Self { blocks: Blocks::of(session.endpoint.profile()), bad: 0 };
-        off::at_the_beginning(session, &mut Way { conversation: &mut conversation, wire })?;
+    pub fn begin(session: &mut Session, wire: &'a mut dyn Registers) -> Result<Self, Ended> {
+        let mut conversation = Self { wire, blocks: Blocks::of(session.endpoint.profile()), bad: 0 };
+        off::at_the_beginning(session, &mut conversation)?;
         let set_up = session.endpoint.profile().description.init.is_empty();
         session.endpoint.hold(!set_up);
         for (frame, poll) in polls(session) {
-            conversation.read(session, wire, frame, &poll)?;
+            conversation.read(session, frame, &poll)?;
         }
-        initialise(session, wire)?;
+        conversation.initialise(session)?;
         session.endpoint.hold(false);
-        for (frame, poll) in polls(session).into_iter().filter(|(_, poll)| !set_up && poll.rate_hz.is_some())
-        {
-            conversation.read(session, wire, frame, &poll)?;
+        if !set_up {
+            conversation.read_state(session)?;
         }
         Ok(conversation)
     }
@@ -106,12 +106,7 @@ impl Conversation {
     ///
     /// # Errors
     /// Always: why it ended.
-    pub fn go_on(
-        mut self,
-        session: &mut Session,
-        wire: &mut dyn Registers,
-        rate_hz: Option<f64>,
-    ) -> Result<Infallible, Ended> {
+    pub fn go_on(mut self, session: &mut Session, rate_hz: Option<f64>) -> Result<Infallible, Ended> {
         session.tell(Ok(()));
         let now = session.now();
         let often = |(frame, poll): (FrameId, Poll)| {
@@ -124,20 +119,20 @@ impl Conversation {
         let mut write = rates.reduce(f64::max).map(|rate| Periodic::new(rate, now));
         loop {
             if session.stopping() {
-                return Err(off::at_the_end(session, &mut Way { conversation: &mut self, wire }));
+                return Err(off::at_the_end(session, &mut self));
             }
             let now = session.now();
             if let Some(periodic) = write.as_mut().filter(|periodic| periodic.is_due(now)) {
                 match session.endpoint.due(now) {
                     Due::Nothing => {}
-                    Due::SetPoints(set_points) => self.command(session, wire, &set_points)?,
-                    Due::Safe(_) => Way { conversation: &mut self, wire }.send_off(session)?,
+                    Due::SetPoints(set_points) => self.command(session, &set_points)?,
+                    Due::Safe(_) => self.send_off(session)?,
                 }
                 periodic.advance(session.now());
             }
             for (periodic, frame, poll) in &mut reads {
                 if periodic.is_due(session.now()) {
-                    self.read(session, wire, *frame, poll)?;
+                    self.read(session, *frame, poll)?;
                     periodic.advance(session.now());
                 }
             }
@@ -147,16 +142,10 @@ impl Conversation {
         }
     }
 
-    fn read(
-        &mut self,
-        session: &mut Session,
-        wire: &mut dyn Registers,
-        frame: FrameId,
-        poll: &Poll,
-    ) -> Result<(), Ended> {
+    fn read(&mut self, session: &mut Session, frame: FrameId, poll: &Poll) -> Result<(), Ended> {
         // The first read that brings nothing ends the sample.
         let spans = session.endpoint.profile().frames()[frame.0].spans.clone();
-        let read = |span: &Span| wire.read(poll.table, span.address, span.count);
+        let read = |span: &Span| self.wire.read(poll.table, span.address, span.count);
         let answer: Result<Vec<Vec<u8>>, Trouble> = spans.iter().map(read).collect();
         let answer = answer.map(|parts| parts.concat());
         let arrived = session.now();
@@ -168,46 +157,25 @@ impl Conversation {
     }
 
     /// Sends the loop's command in one piece. One that is not taken is followed by an 'off' at once.
-    fn command(
-        &mut self,
-        session: &mut Session,
-        wire: &mut dyn Registers,
-        set_points: &[(SetId, f64)],
-    ) -> Result<(), Ended> {
-        let answer = self.write(session, wire, set_points);
+    fn command(&mut self, session: &mut Session, set_points: &[(SetId, f64)]) -> Result<(), Ended> {
+        let answer = self.write(session, set_points);
         if self.judge(session, answer)?.is_none() {
             session.endpoint.refused();
-            Way { conversation: self, wire }.send_off(session)?;
+            self.send_off(session)?;
         }
         Ok(())
     }
 
     /// Every block that holds one of the set-points, even after a failure; returns the first trouble.
-    fn write(
-        &mut self,
-        session: &Session,
-        wire: &mut dyn Registers,
-        set_points: &[(SetId, f64)],
-    ) -> Result<(), Trouble> {
+    fn write(&mut self, session: &Session, set_points: &[(SetId, f64)]) -> Result<(), Trouble> {
         let mut outcome = Ok(());
         for (block, registers) in self.blocks.put(session.endpoint.profile(), set_points) {
-            match wire.write(block.table, block.address, &registers) {
+            match self.wire.write(block.table, block.address, &registers) {
                 Err(Trouble::Ended(ended)) => return Err(Trouble::Ended(ended)),
                 written => outcome = outcome.and(written),
             }
         }
         outcome
-    }
-
-    /// One set-point by itself, in its own registers.
-    fn write_one(
-        &mut self,
-        session: &Session,
-        wire: &mut dyn Registers,
-        (set, value): (SetId, f64),
-    ) -> Result<(), Trouble> {
-        let own = self.blocks.put_one(session.endpoint.profile(), set, value);
-        own.map_or(Ok(()), |(table, address, own)| wire.write(table, address, &own))
     }
 
     /// Tells 'the instrument refused' from 'we could not talk'. A few bad answers are borne.
@@ -234,41 +202,36 @@ impl Conversation {
         let hopeless = session.is_first() && matches!(ended, Ended::Refused(_));
         if self.bad >= BAD_IN_A_ROW || hopeless { Err(ended) } else { Ok(None) }
     }
-}
 
-/// What the profile wants done before the samples count, once the signature is known to hold.
-fn initialise(session: &Session, wire: &mut dyn Registers) -> Result<(), Ended> {
-    for init in &session.endpoint.profile().description.init {
-        let done = match (init.function, init.copy, &init.registers) {
-            (Some((function, data)), ..) => wire.own_function(function, data),
-            (None, Some((from, to, count)), _) => wire
-                .read(Table::Holding, from, count)
-                .and_then(|bytes| wire.write(Table::Holding, to, &words(&bytes))),
-            (None, None, Some((first, values))) => wire.write(init.table, *first, values),
-            (None, None, None) => Ok(()),
-        };
-        match done {
-            Ok(()) => {}
-            Err(Trouble::Ended(ended)) => return Err(ended),
-            Err(Trouble::Refused(problem) | Trouble::Corrupt(problem)) => {
-                return Err(Ended::Refused(format!("{}: {problem}", init.text)));
+    /// What the profile wants done before the samples count, once the signature is known to hold.
+    fn initialise(&mut self, session: &Session) -> Result<(), Ended> {
+        for init in &session.endpoint.profile().description.init {
+            let done = match (init.function, init.copy, &init.registers) {
+                (Some((function, data)), ..) => self.wire.own_function(function, data),
+                (None, Some((from, to, count)), _) => self
+                    .wire
+                    .read(Table::Holding, from, count)
+                    .and_then(|bytes| self.wire.write(Table::Holding, to, &words(&bytes))),
+                (None, None, Some((first, values))) => self.wire.write(init.table, *first, values),
+                (None, None, None) => Ok(()),
+            };
+            match done {
+                Ok(()) => {}
+                Err(Trouble::Ended(ended)) => return Err(ended),
+                Err(Trouble::Refused(problem) | Trouble::Corrupt(problem)) => {
+                    return Err(Ended::Refused(format!("{}: {problem}", init.text)));
+                }
             }
         }
+        Ok(())
     }
-    Ok(())
 }
 
 fn words(block: &[u8]) -> Vec<u16> {
     block.chunks_exact(2).map(|pair| u16::from_be_bytes([pair[0], pair[1]])).collect()
 }
 
-/// A conversation and its wire, as the way to an 'off'.
-struct Way<'a> {
-    conversation: &'a mut Conversation,
-    wire: &'a mut dyn Registers,
-}
-
-impl OffWay for Way<'_> {
+impl OffWay for Conversation<'_> {
     fn send_off(&mut self, session: &mut Session) -> Result<(), Ended> {
         let safe = session.endpoint.hand_out_off(session.now());
         let health = session.endpoint.health();
@@ -280,14 +243,16 @@ impl OffWay for Way<'_> {
                 Ok(false)
             }
         };
-        let whole = self.conversation.write(session, self.wire, &safe);
+        let whole = self.write(session, &safe);
         if whole.map_or_else(&mut not_taken, |()| Ok(true))? {
             return Ok(());
         }
         // Some instruments refuse a block for the sake of one value in it: each by itself then, whatever becomes of the others.
         let mut all = true;
-        for one in safe {
-            let taken = self.conversation.write_one(session, self.wire, one);
+        for (set, value) in safe {
+            let own = self.blocks.put_one(session.endpoint.profile(), set, value);
+            let Some((table, address, registers)) = own else { continue };
+            let taken = self.wire.write(table, address, &registers);
             all &= taken.map_or_else(&mut not_taken, |()| Ok(true))?;
         }
         if !all {
@@ -303,16 +268,10 @@ impl OffWay for Way<'_> {
 
     fn read_state(&mut self, session: &mut Session) -> Result<(), Ended> {
         let mut regular = polls(session).into_iter().filter(|(_, poll)| poll.rate_hz.is_some());
-        regular.try_for_each(|(frame, poll)| self.conversation.read(session, self.wire, frame, &poll))
+        regular.try_for_each(|(frame, poll)| self.read(session, frame, &poll))
     }
 }
 
 fn polls(session: &Session) -> Vec<(FrameId, Poll)> {
-    let profile = session.endpoint.profile();
-    let frames = profile.frames().iter().enumerate();
-    let poll = |kind: &FrameKind| match kind {
-        FrameKind::Poll(index) => Some(profile.description.poll[*index].clone()),
-        _ => None,
-    };
-    frames.filter_map(|(i, frame)| poll(&frame.kind).map(|poll| (FrameId(i), poll))).collect()
+    session.endpoint.profile().polls().map(|(frame, poll)| (frame, poll.clone())).collect()
 }

@@ -47,7 +47,7 @@ pub(crate) fn spawn(instrument: &InstrumentSetup, session: Session) -> Result<Jo
         wire.line.with(|line| line.drain(longest, 10 * longest))?;
         let conversation = Conversation::begin(session, &mut wire)?;
         match stream {
-            None => conversation.go_on(session, &mut wire, rate_hz),
+            None => conversation.go_on(session, rate_hz),
             Some(stream) => wire.listen(session, &stream),
         }
     })
@@ -153,18 +153,6 @@ impl Rtu {
         Err(Ended::Io("the instrument's stream cannot be stopped".into()))
     }
 
-    /// A function of the maker's own with its byte.
-    fn own(&mut self, function: u8, data: u8) -> Result<(), Trouble> {
-        let request = rtu::custom(self.unit, function, &[data], 5);
-        let answer = self.ask(&request)?;
-        // The first bytes of a stream may follow at once: only the answer itself is judged.
-        let answered = rtu::payload(&request, &answer[..answer.len().min(5)]).map(|payload| payload[0]);
-        match self.judged(answered)? {
-            rtu::DONE => Ok(()),
-            other => Err(Trouble::Refused(format!("function {function:#04x} was answered by {other}"))),
-        }
-    }
-
     /// Starts the stream and hands over its frames until something is wrong.
     fn listen(&mut self, session: &mut Session, stream: &Stream) -> Result<Infallible, Ended> {
         self.start_stream(stream)?;
@@ -181,7 +169,7 @@ impl Rtu {
             let started = if let Some((address, value)) = stream.start_register {
                 self.write(Table::Holding, address, &[value])
             } else if let Some((function, data)) = stream.start_function {
-                self.own(function, data)
+                self.own_function(function, data)
             } else {
                 break;
             };
@@ -211,7 +199,14 @@ impl Registers for Rtu {
     }
 
     fn own_function(&mut self, function: u8, data: u8) -> Result<(), Trouble> {
-        self.own(function, data)
+        let request = rtu::custom(self.unit, function, &[data], 5);
+        let answer = self.ask(&request)?;
+        // The first bytes of a stream may follow at once: only the answer itself is judged.
+        let answered = rtu::payload(&request, &answer[..answer.len().min(5)]).map(|payload| payload[0]);
+        match self.judged(answered)? {
+            rtu::DONE => Ok(()),
+            other => Err(Trouble::Refused(format!("function {function:#04x} was answered by {other}"))),
+        }
     }
 
     fn wait_up_to(&mut self, answer_ms: u32) {

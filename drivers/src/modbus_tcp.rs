@@ -37,7 +37,7 @@ pub(crate) fn spawn(instrument: &InstrumentSetup, session: Session) -> Result<Jo
         let mut wire = Tcp::connect((&runtime, &clock), address, unit, connect_ms, answer_ms)?;
         let health = session.endpoint.health();
         health.count(&health.connections);
-        Conversation::begin(session, &mut wire)?.go_on(session, &mut wire, rate_hz)
+        Conversation::begin(session, &mut wire)?.go_on(session, rate_hz)
     })
 }
 

@@ -8,14 +8,13 @@ use super::modbus_tcp::{Tcp, resolve};
 use super::remedy::advice;
 use super::transport::Address;
 use instruments::bus::CanEvent;
+pub use instruments::profile::MOST_REGISTERS;
 use instruments::schema::Table;
 use std::collections::BTreeMap;
 use std::time::{Duration, Instant};
 
 /// How long a connection may take, and how long an answer, in ms.
 const PATIENCE_MS: u32 = 1000;
-/// Most registers in one request, of Modbus.
-pub const MOST_REGISTERS: u16 = 125;
 /// Most bytes that are listened to.
 pub const MOST_BYTES: usize = 4096;
 
@@ -74,10 +73,8 @@ pub enum PeekError {
     Refused(String),
     #[error("{0}; check speed, format and wiring of the line")]
     Corrupt(String),
-    #[error("{0} is a CAN bus and has no registers; leave them out")]
-    NoRegisters(String),
-    #[error("{0} is a CAN bus and has no lines")]
-    NoLines(String),
+    #[error("{0} is a CAN bus and has no {1}")]
+    CanBus(String, &'static str),
 }
 
 impl From<Trouble> for PeekError {
@@ -111,7 +108,7 @@ pub fn registers(
         Place::Serial(path) => {
             Rtu::open(path, speed.baud, &speed.format, unit, PATIENCE_MS)?.read(table, first, count)?
         }
-        Place::Can(name) => return Err(PeekError::NoRegisters(name.clone())),
+        Place::Can(name) => return Err(PeekError::CanBus(name.clone(), "registers; leave them out")),
     };
     Ok(bytes.chunks_exact(2).map(|pair| u16::from_be_bytes([pair[0], pair[1]])).collect())
 }
@@ -155,7 +152,7 @@ pub fn bytes(place: &Place, speed: &Speed, long: Duration) -> Result<Vec<u8>, Pe
     let address = match place {
         Place::Serial(path) => Address::Serial(path.clone(), speed.baud, speed.format.clone()),
         Place::Tcp(host) => Address::Tcp(resolve(host, None)?),
-        Place::Can(name) => return Err(PeekError::NoLines(name.clone())),
+        Place::Can(name) => return Err(PeekError::CanBus(name.clone(), "lines")),
     };
     let patience = Duration::from_millis(PATIENCE_MS.into());
     let mut transport = address.open(patience)?;

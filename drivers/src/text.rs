@@ -13,11 +13,10 @@ use super::session::{Periodic, Session};
 use super::setup::InstrumentSetup;
 use super::stream::first_line;
 use super::transport::{Address, Transport};
+use instruments::codec::from_hex;
 use instruments::codec::pattern::Pattern;
 use instruments::codec::text::number;
-use instruments::profile::FrameKind;
 use instruments::schema::{Init, Link, LinkKind, Query, Stream};
-use instruments::vector::from_hex;
 use instruments::{FrameId, Profile, SetId};
 use std::collections::HashMap;
 use std::convert::Infallible;
@@ -420,11 +419,5 @@ impl OffWay for Talk {
 }
 
 fn queries(session: &Session) -> Vec<(FrameId, Query)> {
-    let profile = session.endpoint.profile();
-    let frames = profile.frames().iter().enumerate();
-    let query = |kind: &FrameKind| match kind {
-        FrameKind::Query(index) => Some(profile.description.query[*index].clone()),
-        _ => None,
-    };
-    frames.filter_map(|(i, frame)| query(&frame.kind).map(|query| (FrameId(i), query))).collect()
+    session.endpoint.profile().queries().map(|(frame, query)| (frame, query.clone())).collect()
 }

@@ -9,10 +9,9 @@ use super::serial::Line;
 use super::stream::first_line;
 use super::{Ended, OpenError};
 use calibration::amplitude::vibrometer::Decoder;
+use instruments::Profile;
 use instruments::codec::text::quantity;
-use instruments::profile::FrameKind;
 use instruments::schema::{Link, LinkKind};
-use instruments::{FrameId, Profile};
 use serde::{Deserialize, Serialize};
 use std::sync::Arc;
 use std::time::{Duration, Instant};
@@ -119,7 +118,7 @@ pub fn settings(setup: &VibrometerSetup) -> Result<Settings, OpenError> {
     let profile = setup.description()?;
     let link = profile.description.link.clone();
     let (LinkKind::Serial, Some(choice)) = (link.kind, link.choice.clone()) else {
-        return Err(OpenError::NoVibrometer(setup.profile.clone()));
+        return Err(OpenError::Unfit(setup.profile.clone(), " is not that of a vibrometer's controller"));
     };
     let (id, address) = (&setup.profile, &setup.address);
     let failed = |problem| OpenError::Beside { id: id.clone(), address: address.clone(), problem };
@@ -138,13 +137,12 @@ pub fn settings(setup: &VibrometerSetup) -> Result<Settings, OpenError> {
             Err(error) => return Err(failed(error)),
         }
     }
-    let number = choose(&decoders, setup.decoder.as_deref());
-    let number =
-        number.map_err(|problem| OpenError::Decoder { id: id.clone(), address: address.clone(), problem })?;
+    let number = choose(&decoders, setup.decoder.as_deref()).map_err(|why| failed(Ended::Io(why)))?;
     let mut read = || talk.settings(&profile, number, &decoders).map_err(failed);
     let (first, second) = (read()?, read()?);
     if first != second {
-        return Err(OpenError::SettingsChanged { id: id.clone(), address: address.clone() });
+        let why = "the settings changed while they were read; let nobody touch the controller and ask again";
+        return Err(failed(Ended::Io(why.into())));
     }
     Ok(first)
 }
@@ -211,16 +209,14 @@ impl Talk {
 
     fn settings(&mut self, profile: &Profile, number: u8, decoders: &[String]) -> Result<Settings, Ended> {
         let mut values = profile.values();
-        for (index, frame) in profile.frames().iter().enumerate() {
-            let FrameKind::Query(query) = frame.kind else { continue };
-            let query = &profile.description.query[query];
+        for (frame, query) in profile.queries() {
             let question = query.send.replace("{which}", &number.to_string());
             let answer = self.ask(&question)?;
             let unit = query.unit.as_deref().unwrap_or("");
             let value = quantity(&answer, unit)
                 .ok_or_else(|| Ended::Refused(format!("`{question}` was answered by `{answer}`")))?;
             profile
-                .decode(FrameId(index), &value.to_be_bytes(), &mut values)
+                .decode(frame, &value.to_be_bytes(), &mut values)
                 .map_err(|error| Ended::Refused(format!("`{question}`, `{answer}`: {error}")))?;
         }
         let value = |name: &str| {

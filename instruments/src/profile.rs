@@ -14,7 +14,7 @@ use crate::codec::dbc::DbcSignal;
 use crate::error::ProfileError;
 use crate::expression::Expression;
 use crate::field::{Field, NumberType};
-use crate::schema::{Description, Severity};
+use crate::schema::{Description, Poll, Query, Severity};
 use compile::Compiler;
 pub use frame::{Frame, FrameKind, MOST_REGISTERS, Part, Span};
 pub use quantities::power_of_ten;
@@ -52,13 +52,13 @@ impl Values {
     }
 }
 
-/// A frame was refused.
+/// A frame was refused: it has not the length that the profile states.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, thiserror::Error)]
+#[error("the frame has {found} bytes and should have {expected}")]
 #[allow(missing_docs, reason = "the message of an error says what its fields are")]
-pub enum FrameError {
-    /// Not the length that the profile states.
-    #[error("the frame has {found} bytes and should have {expected}")]
-    Length { expected: usize, found: usize },
+pub struct FrameError {
+    pub expected: usize,
+    pub found: usize,
 }
 
 /// Where a signal stands in its frame.
@@ -86,6 +86,15 @@ impl Place {
             Place::Bytes(field) => field.write(frame, value),
             Place::Dbc(at, signal) => frame.get_mut(*at..).is_some_and(|frame| signal.write(frame, value)),
             Place::Computed(_) => true,
+        }
+    }
+
+    /// Whether the frame has a whole number for it.
+    fn has_counts(&self) -> bool {
+        match self {
+            Place::Bytes(Field { bits: None, number: NumberType::F32 | NumberType::F64, .. }) => false,
+            Place::Dbc(_, signal) => !signal.float,
+            Place::Bytes(_) | Place::Computed(_) => true,
         }
     }
 
@@ -119,17 +128,6 @@ pub(crate) struct CompiledSignal {
     step: f64,
 }
 
-impl CompiledSignal {
-    /// Whether the frame has a whole number for it.
-    fn has_counts(&self) -> bool {
-        match &self.place {
-            Place::Bytes(Field { bits: None, number: NumberType::F32 | NumberType::F64, .. }) => false,
-            Place::Dbc(_, signal) => !signal.float,
-            Place::Bytes(_) | Place::Computed(_) => true,
-        }
-    }
-}
-
 /// An instrument's description, ready for use.
 #[derive(Debug, Clone)]
 pub struct Profile {
@@ -157,6 +155,13 @@ impl Profile {
         let mut description = described(text)?;
         description.signal = computed::spread(description.signal);
         Compiler { text, description: &description, file }.compile()
+    }
+
+    /// The same with its golden vectors run ([`Profile::check`]).
+    pub fn checked(text: &str, file: &dyn Fn(&str) -> Option<String>) -> Result<Self, ProfileError> {
+        let profile = Self::parse_with(text, file)?;
+        profile.check(text)?;
+        Ok(profile)
     }
 
     /// The files that a profile names, such as its DBC file: what [`Profile::parse_with`] will ask for.
@@ -193,6 +198,22 @@ impl Profile {
         &self.frames
     }
 
+    /// The polls, each with its frame.
+    pub fn polls(&self) -> impl Iterator<Item = (FrameId, &Poll)> {
+        self.frames.iter().enumerate().filter_map(|(i, frame)| match frame.kind {
+            FrameKind::Poll(index) => Some((FrameId(i), &self.description.poll[index])),
+            _ => None,
+        })
+    }
+
+    /// The queries, each with its frame.
+    pub fn queries(&self) -> impl Iterator<Item = (FrameId, &Query)> {
+        self.frames.iter().enumerate().filter_map(|(i, frame)| match frame.kind {
+            FrameKind::Query(index) => Some((FrameId(i), &self.description.query[index])),
+            _ => None,
+        })
+    }
+
     /// How many values a signal has before it runs round, and the SI value of one count.
     pub fn turn(&self, signal: SignalId) -> (f64, f64) {
         let signal = &self.signals[signal.0];
@@ -222,7 +243,7 @@ impl Profile {
     pub fn decode(&self, frame: FrameId, bytes: &[u8], values: &mut Values) -> Result<(), FrameError> {
         let expected = self.frame_bytes(frame);
         if bytes.len() != expected {
-            return Err(FrameError::Length { expected, found: bytes.len() });
+            return Err(FrameError { expected, found: bytes.len() });
         }
         // Scales may depend on signals of the same frame, so raw values come first.
         let stored = |s: &CompiledSignal| s.frame == frame && !matches!(s.place, Place::Computed(_));
@@ -278,13 +299,14 @@ impl Profile {
     /// of text and of a signal that is worked out a count is 1e-12 of its unit: no certificate depends on the
     /// resolution that a profile states. Zero where the frame is too short.
     pub fn raw(&self, signal: SignalId, frame: &[u8], values: &Values) -> i64 {
-        let compiled = &self.signals[signal.0];
-        let (number, count) = match &compiled.place {
+        let place = &self.signals[signal.0].place;
+        let read = || place.read(frame).unwrap_or(0.0);
+        let (number, count) = match place {
             Place::Computed(_) => (values.get(signal), COUNT_OF_A_FLOAT),
-            place if !compiled.has_counts() => (place.read(frame).unwrap_or(0.0), COUNT_OF_A_FLOAT),
+            place if !place.has_counts() => (read(), COUNT_OF_A_FLOAT),
             // The file's offset shifts the counts.
-            Place::Dbc(_, dbc) => (compiled.place.read(frame).unwrap_or(0.0), dbc.factor),
-            place => (place.read(frame).unwrap_or(0.0), 1.0),
+            Place::Dbc(_, dbc) => (read(), dbc.factor),
+            Place::Bytes(_) => (read(), 1.0),
         };
         // saturates, and NaN gives zero
         (number / count).round() as i64

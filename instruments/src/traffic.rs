@@ -22,12 +22,6 @@ pub struct LineSetup {
     pub rate_hz: Option<f64>,
 }
 
-/// Bits of a classic CAN frame besides its data: start, identifier, control, CRC, acknowledgement, end and
-/// pause, without the stuffing, which adds up to a fifth.
-const fn can_overhead(extended: bool) -> f64 {
-    if extended { 67.0 } else { 47.0 }
-}
-
 /// Bits of one byte on a serial line: start, data, parity, stop.
 fn bits_a_byte(format: &str) -> f64 {
     let digit = |at: usize| format.as_bytes().get(at).map_or(0, |byte| byte.saturating_sub(b'0'));
@@ -49,14 +43,12 @@ impl Profile {
             LinkKind::ModbusTcp | LinkKind::ModbusRtu => {
                 let baud = serial(19_200);
                 let pause = silence_s(baud as u32);
-                let polls = self.frames().iter().filter_map(|frame| {
-                    let FrameKind::Poll(index) = frame.kind else { return None };
-                    let poll = &d.poll[index];
+                let polls = self.polls().filter_map(|(frame, poll)| {
                     let rate = setup.rate_hz.or(poll.rate_hz).filter(|_| poll.rate_hz.is_some())?;
                     let bytes =
                         |count: u16| f64::from(count) * if poll.table.is_bits() { 0.125 } else { 2.0 };
-                    let reads =
-                        frame.spans.iter().map(|span| (8.0 + 5.0 + bytes(span.count)) * byte_s(baud) + pause);
+                    let spans = self.frames()[frame.0].spans.iter();
+                    let reads = spans.map(|span| (8.0 + 5.0 + bytes(span.count)) * byte_s(baud) + pause);
                     Some(rate * reads.sum::<f64>())
                 });
                 polls.sum::<f64>() + self.stream_bytes_s() * byte_s(baud)
@@ -79,7 +71,10 @@ impl Profile {
                 let groups = self.frames().iter().filter_map(|frame| {
                     let FrameKind::Messages(index, parts) = &frame.kind else { return None };
                     let message = &d.message[*index];
-                    let bits = |extended, bytes: usize| can_overhead(extended) + 8.0 * bytes as f64;
+                    // Besides its data a classic CAN frame has start, identifier, control, CRC, acknowledgement,
+                    // end and pause, without the stuffing, which adds up to a fifth.
+                    let overhead = |extended| if extended { 67.0 } else { 47.0 };
+                    let bits = |extended, bytes: usize| overhead(extended) + 8.0 * bytes as f64;
                     let request = message.request.as_ref().map_or(0.0, |data| bits(false, data.len()));
                     let answer: f64 = parts.iter().map(|part| bits(part.extended, part.length)).sum();
                     Some(setup.rate_hz.unwrap_or(message.rate_hz) * (request + answer))

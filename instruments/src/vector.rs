@@ -3,7 +3,7 @@
 //! A vector is decoded and compared; where the frame's bytes are all covered by signals it is
 //! encoded again as well. The same vectors are put to independent peers by the system tests.
 
-pub use crate::codec::from_hex;
+use crate::codec::from_hex;
 use crate::error::ProfileError;
 use crate::field::NumberType;
 use crate::profile::{FrameId, FrameKind, Profile};

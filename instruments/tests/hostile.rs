@@ -2,7 +2,7 @@
 //! Sound frames with a few bytes changed reach further than noise does, so both are tried.
 
 use muprime_instruments::codec::{can, canopen, checksum::Check, dbc, modbus_rtu, stream, text};
-use muprime_instruments::{Profile, vector};
+use muprime_instruments::{Profile, codec};
 use proptest::prelude::*;
 
 /// Sound frames to start from.
@@ -13,7 +13,7 @@ fn sound() -> Vec<Vec<u8>> {
         modbus_rtu::give(9, 3, &[1, 2, 3, 4, 5, 6]),
         modbus_rtu::refuse(9, 3, 2),
         b"t1B4102\rT012345678\x30102030405060708\rz\r\x07".to_vec(),
-        vector::from_hex("204e96003cf6d2040a00ecff1e0082ad").unwrap(),
+        codec::from_hex("204e96003cf6d2040a00ecff1e0082ad").unwrap(),
         canopen::sdo_write(5, 0x60FF, 0, 4, -1).data().to_vec(),
         b"+2.750000000000000E+04\r\n".to_vec(),
     ]

@@ -4,8 +4,6 @@ use crc::{Algorithm, Crc, Table};
 use schemars::JsonSchema;
 use serde::Deserialize;
 
-const CRC16_MODBUS: Crc<u16> = Crc::<u16>::new(&crc::CRC_16_MODBUS);
-
 /// A cyclic redundancy check of whole bytes from the catalogue of parametrised CRC algorithms, by the width of its register.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum Cyclic {
@@ -204,11 +202,6 @@ impl Check {
             _ => check == self.of(body, high_first),
         }
     }
-}
-
-/// CRC-16/MODBUS.
-pub fn crc16_modbus(bytes: &[u8]) -> u16 {
-    CRC16_MODBUS.checksum(bytes)
 }
 
 fn sum(body: &[u8]) -> u8 {

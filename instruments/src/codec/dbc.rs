@@ -75,10 +75,8 @@ pub enum DbcError {
     TwoSignals { message: String, signal: String, lines: (usize, usize) },
     #[error("line {line}: signal {signal} is a float of {bits} bits")]
     Float { line: usize, signal: String, bits: u64 },
-    #[error("line {line}: a start bit is too large")]
-    Start { line: usize },
-    #[error("line {line}: a signal is too wide")]
-    Width { line: usize },
+    #[error("line {line}: {what}")]
+    TooLarge { line: usize, what: &'static str },
     #[error("line {line}: signal {signal} does not lie within message {message}")]
     Outside { line: usize, signal: String, message: String },
 }
@@ -238,9 +236,10 @@ fn place(
     if float.is_some_and(|bits| bits != signal.size) {
         return Err(DbcError::Float { line, signal: name(), bits: signal.size });
     }
+    let small = |n: u64, what| u16::try_from(n).map_err(|_| DbcError::TooLarge { line, what });
     let place = DbcSignal {
-        start: u16::try_from(signal.start_bit).map_err(|_| DbcError::Start { line })?,
-        size: u16::try_from(signal.size).map_err(|_| DbcError::Width { line })?,
+        start: small(signal.start_bit, "a start bit is too large")?,
+        size: small(signal.size, "a signal is too wide")?,
         little_endian: signal.byte_order == can_dbc::ByteOrder::LittleEndian,
         signed: signal.value_type == can_dbc::ValueType::Signed,
         float: float.is_some(),

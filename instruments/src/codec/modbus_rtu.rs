@@ -5,7 +5,7 @@
 //! answer has no transaction number: all that ties it to its request is unit, function and length,
 //! so every one of them is checked, and the length is known before the first byte arrives.
 
-use super::checksum::crc16_modbus;
+use super::checksum::Check;
 
 /// What may come back to a request.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, thiserror::Error)]
@@ -40,8 +40,7 @@ pub const DONE: u8 = 1;
 pub const EXCEPTION_LENGTH: usize = 5;
 
 fn closed(mut body: Vec<u8>) -> Vec<u8> {
-    let crc = crc16_modbus(&body);
-    body.extend(crc.to_le_bytes());
+    body.extend(Check::CRC_16_MODBUS.of(&body, None));
     body
 }
 
@@ -114,7 +113,7 @@ pub fn payload<'a>(request: &Request, answer: &'a [u8]) -> Result<&'a [u8], RtuE
         return Err(RtuError::Mismatch);
     }
     let (body, crc) = answer.split_at(answer.len() - 2);
-    if crc16_modbus(body).to_le_bytes() != crc {
+    if !Check::CRC_16_MODBUS.holds(body, crc, None) {
         return Err(RtuError::Crc);
     }
     let (unit, function) = (request.bytes[0], request.bytes[1]);
@@ -208,7 +207,7 @@ pub fn hear(bytes: &[u8], own: &[u8]) -> Heard {
     };
     let Some(frame) = bytes.get(..length) else { return Heard::Incomplete };
     let (body, crc) = frame.split_at(length - 2);
-    if crc16_modbus(body).to_le_bytes() != crc {
+    if !Check::CRC_16_MODBUS.holds(body, crc, None) {
         return Heard::Noise;
     }
     let word = |at: usize| u16::from_be_bytes([body[at], body[at + 1]]);

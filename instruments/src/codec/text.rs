@@ -55,16 +55,18 @@ pub fn number(line: &str) -> Option<f64> {
     }
 }
 
-/// SI prefixes as instruments of text write them; the two signs for micro are the micro sign and the Greek letter.
-const PREFIXES: [(&str, f64); 8] = [
-    ("n", 1e-9),
+/// SI prefixes as instruments of text write them, the largest first, none among them; the two other signs for
+/// micro are the micro sign and the Greek letter.
+pub(crate) const PREFIXES: [(&str, f64); 9] = [
+    ("G", 1e9),
+    ("M", 1e6),
+    ("k", 1e3),
+    ("", 1.0),
+    ("m", 1e-3),
     ("u", 1e-6),
     ("\u{b5}", 1e-6),
     ("\u{3bc}", 1e-6),
-    ("m", 1e-3),
-    ("k", 1e3),
-    ("M", 1e6),
-    ("G", 1e9),
+    ("n", 1e-9),
 ];
 
 /// The value in `unit` that a line such as `5mm/s/V` (0.005 m/s/V) or `8.16 us` stands for: a number, perhaps
@@ -73,6 +75,7 @@ pub fn quantity(line: &str, unit: &str) -> Option<f64> {
     let rest = line.trim().strip_suffix(unit)?;
     let (number, factor) = PREFIXES
         .iter()
+        .filter(|(prefix, _)| !prefix.is_empty())
         .find_map(|(prefix, factor)| rest.strip_suffix(prefix).map(|number| (number, *factor)))
         .unwrap_or((rest, 1.0));
     // A decimal number is all that may be left: Rust would read `inf` and `1e3` as well.
@@ -83,9 +86,8 @@ pub fn quantity(line: &str, unit: &str) -> Option<f64> {
 
 /// The line that stands for a value in `unit`, with the prefix that leaves one to three digits before the point.
 pub fn with_prefix(value: f64, unit: &str) -> String {
-    let steps = [(1e9, "G"), (1e6, "M"), (1e3, "k"), (1.0, ""), (1e-3, "m"), (1e-6, "u"), (1e-9, "n")];
-    let (factor, prefix) =
-        steps.into_iter().find(|(factor, _)| value.abs() >= factor * (1.0 - 1e-9)).unwrap_or((1.0, ""));
+    let fits = |(_, factor): &&(&str, f64)| value.abs() >= factor * (1.0 - 1e-9);
+    let (prefix, factor) = PREFIXES.iter().find(fits).unwrap_or(&("", 1.0));
     // What decimal prefixes leave of binary fractions is rounded away.
     let shown = format!("{:.9}", value / factor);
     let shown = shown.trim_end_matches('0').trim_end_matches('.');

@@ -55,8 +55,8 @@ impl Compiler<'_> {
         let signatures = d.signature.iter().map(|s| condition(&s.when)).collect::<Result<_, _>>()?;
         let faults = d.fault.iter().map(|f| condition(&f.when)).collect::<Result<_, _>>()?;
         for (set, compiled) in d.set.iter().zip(&sets) {
-            let echo = set.echo.as_deref().and_then(index).map(|at| &signals[at]);
-            self.check_echo(set, compiled, echo, &frames)?;
+            let echo = set.echo.as_deref().and_then(index);
+            self.check_echo(set, compiled, echo, echo.map(|at| &frames[signals[at].frame.0]))?;
         }
         self.check_emulator(&index)?;
         self.check_frames(&frames, &signals)?;
@@ -345,8 +345,8 @@ impl Compiler<'_> {
             (_, Some(Form::Pattern(pattern))) => {
                 pattern.fields().find(|(field, _)| field == name).and_then(|(_, form)| form.step())
             }
-            (Place::Bytes(Field { bits: None, number: NumberType::F32 | NumberType::F64, .. }), _) => None,
-            (Place::Dbc(_, signal), _) => (!signal.float).then_some(signal.factor),
+            (place, _) if !place.has_counts() => None,
+            (Place::Dbc(_, signal), _) => Some(signal.factor),
             _ => Some(1.0),
         };
         Ok(CompiledSignal {

@@ -47,11 +47,6 @@ impl Compiler<'_> {
         Err(self.at_text(section, why))
     }
 
-    /// Refuses what has this name.
-    fn refuse_named(&self, name: &toml::Spanned<String>, why: impl ToString) -> Result<(), ProfileError> {
-        Err(self.at_name(name, why))
-    }
-
     pub(super) fn check_header(&self) -> Result<(), ProfileError> {
         let link = &self.description.link;
         let wrong = |why: String| self.at_text("[profile]", why);
@@ -145,7 +140,7 @@ impl Compiler<'_> {
         for (name, rate) in messages.chain(d.query.iter().map(|query| (&query.name, query.rate_hz))) {
             if !(rate > 0.0 && rate <= FASTEST_HZ) {
                 let problem = format!("`{}`: a `rate_hz` is above 0 and at most {FASTEST_HZ}", name.as_ref());
-                return self.refuse_named(name, problem);
+                return Err(self.at_name(name, problem));
             }
         }
         for query in &d.query {
@@ -153,19 +148,19 @@ impl Compiler<'_> {
             if d.link.kind == Sysfs && (send.is_empty() || send.starts_with('.') || send.contains(['/', ' ']))
             {
                 let problem = format!("query `{name}`: `{send}` is no name of an attribute");
-                return self.refuse_named(&query.name, problem);
+                return Err(self.at_name(&query.name, problem));
             }
             let forms = [query.length.is_some(), query.unit.is_some(), query.answer.is_some()];
             if forms.iter().filter(|x| **x).count() > 1 {
                 let problem = format!("query `{name}` takes one of `length`, `unit` and `answer`");
-                return self.refuse_named(&query.name, problem);
+                return Err(self.at_name(&query.name, problem));
             }
         }
         if let Some(set) = d.set.iter().find(|set| text != set.send.is_some()) {
             let (lines, none) =
                 ("needs `send`: its link speaks in lines", "has `send`, and no lines to send");
             let problem = format!("set-point `{}` {}", set.name.as_ref(), if text { lines } else { none });
-            return self.refuse_named(&set.name, problem);
+            return Err(self.at_name(&set.name, problem));
         }
         self.check_roles()
     }
@@ -173,20 +168,17 @@ impl Compiler<'_> {
     /// Datagrams: somebody must know where they are to go.
     fn check_udp(&self) -> Result<(), ProfileError> {
         let d = self.description;
-        if d.link.kind != LinkKind::Udp {
-            return match d.link.local_port {
-                Some(_) => self.refuse("[link]", "`local_port` is for a link of kind Udp"),
-                None => Ok(()),
-            };
-        }
-        if d.stream.is_none() {
-            return self.refuse("[link]", "a link of kind Udp needs a [stream]");
-        }
-        if d.link.local_port.is_none() && d.init.is_empty() {
-            let problem = "a link of kind Udp needs `local_port`, or an [[init]] that tells the instrument where to send";
-            return self.refuse("[link]", problem);
-        }
-        Ok(())
+        let (datagrams, local_port) = (d.link.kind == LinkKind::Udp, d.link.local_port.is_some());
+        let why = if !datagrams && local_port {
+            "`local_port` is for a link of kind Udp"
+        } else if datagrams && d.stream.is_none() {
+            "a link of kind Udp needs a [stream]"
+        } else if datagrams && !local_port && d.init.is_empty() {
+            "a link of kind Udp needs `local_port`, or an [[init]] that tells the instrument where to send"
+        } else {
+            return Ok(());
+        };
+        self.refuse("[link]", why)
     }
 
     /// Modbus RTU has no transaction number: an answer that comes late to one of two requests that
@@ -285,7 +277,7 @@ impl Compiler<'_> {
         let wrong = |set: &&Set| set.timeout_ms.is_some_and(|ms| ms == 0 || set.name.as_ref() != "heartbeat");
         let problem = "`timeout_ms` is above zero, and belongs to the set-point `heartbeat`";
         let wrong = self.description.set.iter().find(wrong);
-        wrong.map_or(Ok(()), |set| self.refuse_named(&set.name, problem))
+        wrong.map_or(Ok(()), |set| Err(self.at_name(&set.name, problem)))
     }
 
     /// Whether each set-point is one that the roles command.

@@ -1,15 +1,12 @@
 //! What a profile says twice must agree: a unit and its factor, a set-point and its echo, 'off' and zero.
 
 use super::compile::Compiler;
-use super::{CompiledSet, CompiledSignal, Frame};
+use super::{CompiledSet, Frame};
 use crate::codec::pattern::Form;
-use crate::codec::text;
+use crate::codec::text::{self, PREFIXES};
 use crate::error::ProfileError;
 use crate::schema::{Role, Set, Si};
 use toml::Spanned;
-
-const PREFIXES: [(&str, i32); 9] =
-    [("", 0), ("n", -9), ("u", -6), ("\u{b5}", -6), ("\u{3bc}", -6), ("m", -3), ("k", 3), ("M", 6), ("G", 9)];
 
 /// SI units that take a prefix.
 const UNITS: [&str; 8] = ["N", "m", "m/s", "Hz", "s", "Pa", "V", "A"];
@@ -32,8 +29,8 @@ const NO_OFF: [&str; 4] = ["frequency", "pressure", "temperature", "humidity"];
 /// The power of ten that `written`, such as `mm/s`, has over the SI unit, such as `m/s`.
 pub fn power_of_ten(written: &str, unit: &str) -> Option<i32> {
     let one = |written: &str, unit: &str| {
-        let fits = |(prefix, _): &&(&str, i32)| written.strip_prefix(prefix) == Some(unit);
-        PREFIXES.iter().find(fits).map(|(_, power)| *power)
+        let fits = |(prefix, _): &&(&str, f64)| written.strip_prefix(prefix) == Some(unit);
+        PREFIXES.iter().find(fits).map(|(_, factor)| factor.log10().round() as i32)
     };
     match (written.split_once('/'), unit.split_once('/')) {
         (Some((above, below)), Some((of, per))) => Some(one(above, of)? - one(below, per)?),
@@ -107,42 +104,37 @@ impl Compiler<'_> {
         self.check_unit(&s.name, &s.unit, s.si.factor, &s.si)
     }
 
-    /// Whether a set-point and its echo speak of one quantity, with the same words.
+    /// Whether a set-point and its echo, a signal of `frame`, speak of one quantity with the same words.
     pub(super) fn check_echo(
         &self,
         s: &Set,
         compiled: &CompiledSet,
-        echo: Option<&CompiledSignal>,
-        frames: &[Frame],
+        echo: Option<usize>,
+        frame: Option<&Frame>,
     ) -> Result<(), ProfileError> {
-        let name = s.name.as_ref().as_str();
-        let own = compiled.line.as_ref().and_then(|(pattern, owners)| {
-            pattern.fields().zip(owners).find(|(_, owner)| owner.is_none()).map(|((_, form), _)| form)
-        });
-        let wrong = |why: String| Err(self.at_name(&s.name, why));
+        let (name, unit) = (s.name.as_ref().as_str(), &s.si.unit);
+        let wrong = |why: String| self.at_name(&s.name, why);
         let mut lists = vec![["off", "on"].map(String::from).to_vec()];
         if let Some(named) = &s.echo {
-            let Some(signal) = echo else {
-                return wrong(format!("the echo of set-point `{name}`, `{named}`, is not a signal"));
-            };
-            let found = self.description.signal.iter().find(|signal| signal.name.as_ref() == named);
-            if let Some(other) = found.map(|found| &found.si.unit).filter(|unit| **unit != s.si.unit) {
-                let unit = &s.si.unit;
+            let missing = || wrong(format!("the echo of set-point `{name}`, `{named}`, is not a signal"));
+            let other = &self.description.signal[echo.ok_or_else(missing)?].si.unit;
+            if other != unit {
                 let why = format!("set-point `{name}` is in `{unit}`, its echo `{named}` in `{other}`");
-                return wrong(why);
+                return Err(wrong(why));
             }
-            if let Some(text::Form::Pattern(pattern)) = &frames[signal.frame.0].text
+            if let Some(text::Form::Pattern(pattern)) = frame.and_then(|frame| frame.text.as_ref())
                 && let Some((_, Form::Words(words))) = pattern.fields().find(|(field, _)| field == named)
             {
                 lists.push(words.clone());
             }
         }
-        let Some(Form::Words(words)) = own.filter(|_| !NO_OFF.contains(&name)) else { return Ok(()) };
-        let word = lists.iter().find_map(|list| elsewhere(words, list));
-        let Some(word) = word else { return Ok(()) };
+        let mut own = compiled.line.iter().flat_map(|(pattern, owners)| pattern.fields().zip(owners));
+        let own = own.find(|(_, owner)| owner.is_none()).filter(|_| !NO_OFF.contains(&name));
+        let Some(((_, Form::Words(words)), _)) = own else { return Ok(()) };
+        let Some(word) = lists.iter().find_map(|list| elsewhere(words, list)) else { return Ok(()) };
         let why = format!("set-point `{name}`: `{word}` has another place than in its echo or in `OFF|ON`");
         let help =
             "the first word is 0, off; a word that means its opposite goes into `send` and `send_zero`";
-        Err(self.at_name(&s.name, why).with_help(help))
+        Err(wrong(why).with_help(help))
     }
 }

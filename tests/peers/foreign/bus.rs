@@ -1,8 +1,8 @@
 //! DBC files and data sheets as cantools and python-canopen decode them.
 
 use instruments::codec::encoding::decoded;
+use instruments::codec::from_hex;
 use instruments::codec::{dbc, eds};
-use instruments::vector::from_hex;
 use tests::{documents, file, python};
 
 #[test]

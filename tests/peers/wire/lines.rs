@@ -477,7 +477,7 @@ fn dbc_signals_agree_with_cantools() {
     let all = [output.stdout, output2.stdout].concat();
     for line in String::from_utf8(all).unwrap().lines() {
         let case: serde_json::Value = serde_json::from_str(line).unwrap();
-        let frame = instruments::vector::from_hex(case["hex"].as_str().unwrap()).unwrap();
+        let frame = instruments::codec::from_hex(case["hex"].as_str().unwrap()).unwrap();
         let message = &messages[case["message"].as_str().unwrap()];
         let mut packed = vec![0; frame.len()];
         for (name, value) in case["values"].as_object().unwrap() {
@@ -490,11 +490,7 @@ fn dbc_signals_agree_with_cantools() {
             signal.write(&mut packed, theirs);
             compared += 1;
         }
-        assert_eq!(
-            packed,
-            instruments::vector::from_hex(case["packed"].as_str().unwrap()).unwrap(),
-            "{line}"
-        );
+        assert_eq!(packed, instruments::codec::from_hex(case["packed"].as_str().unwrap()).unwrap(), "{line}");
     }
     assert!(compared > 5_000, "{compared}");
 }

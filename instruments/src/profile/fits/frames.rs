@@ -8,34 +8,26 @@ use crate::schema::{LinkKind, Table};
 
 impl Compiler<'_> {
     pub(super) fn check_poll(&self, poll: &crate::schema::Poll) -> Result<(), ProfileError> {
-        let name = poll.name.as_ref();
-        let wrong = |why: String| Err(self.at_name(&poll.name, format!("poll `{name}` {why}")));
-        match (poll.address, poll.count) {
-            (Some(_), Some(count)) if !(1..=MOST_REGISTERS).contains(&count) => {
-                return wrong(format!("has {count} registers; one read takes 1 to {MOST_REGISTERS}"));
-            }
-            (Some(address), Some(count)) if u32::from(address) + u32::from(count) > 65536 => {
-                return wrong("runs past register 65535".into());
-            }
-            (Some(_), Some(_)) if poll.gap != 0 => {
-                return wrong("has a `gap`, which is for signals with an `address` of their own".into());
-            }
-            (Some(_), None) | (None, Some(_)) => {
-                return wrong("needs both `address` and `count`, or neither".into());
-            }
-            _ => {}
-        }
+        let stated = poll.address.zip(poll.count);
+        let past = |(address, count): (u16, u16)| u32::from(address) + u32::from(count) > 65536;
         let read = match (poll.once, poll.rate_hz) {
-            (true, None) => true,
-            (false, Some(rate)) => rate > 0.0 && rate <= FASTEST_HZ,
-            _ => false,
+            (true, rate) => rate.is_none(),
+            (false, rate) => rate.is_some_and(|rate| rate > 0.0 && rate <= FASTEST_HZ),
         };
-        if !read {
-            return wrong(format!(
-                "needs either `once = true` or a `rate_hz` above 0 and at most {FASTEST_HZ}"
-            ));
-        }
-        Ok(())
+        let why = if let Some((_, count)) = stated.filter(|(_, n)| !(1..=MOST_REGISTERS).contains(n)) {
+            format!("has {count} registers; one read takes 1 to {MOST_REGISTERS}")
+        } else if stated.is_some_and(past) {
+            "runs past register 65535".into()
+        } else if stated.is_some() && poll.gap != 0 {
+            "has a `gap`, which is for signals with an `address` of their own".into()
+        } else if poll.address.is_some() != poll.count.is_some() {
+            "needs both `address` and `count`, or neither".into()
+        } else if !read {
+            format!("needs either `once = true` or a `rate_hz` above 0 and at most {FASTEST_HZ}")
+        } else {
+            return Ok(());
+        };
+        Err(self.at_name(&poll.name, format!("poll `{}` {why}", poll.name.as_ref())))
     }
 
     pub(super) fn check_blocks(&self) -> Result<(), ProfileError> {
@@ -58,63 +50,42 @@ impl Compiler<'_> {
     pub(super) fn check_stream(&self) -> Result<(), ProfileError> {
         let d = self.description;
         let Some(stream) = &d.stream else { return Ok(()) };
-        let wrong = |why: &str| self.refuse("[stream]", format!("[stream]: {why}"));
         let free = matches!(d.link.kind, LinkKind::Serial | LinkKind::Tcp | LinkKind::Udp);
-        let datagrams = d.link.kind == LinkKind::Udp;
         let starts = stream.start_register.is_some() || stream.start_function.is_some();
-        match (stream.line.is_some(), stream.length, stream.check) {
-            (true, None, None) if free && stream.sync.is_empty() => {}
-            (true, ..) => {
-                return wrong(
-                    "`line` is for links of kind Serial, Tcp and Udp, and goes without length, check and sync",
-                );
-            }
-            (false, Some(length), None) if datagrams => {
-                if usize::from(length) <= stream.sync.len() {
-                    return wrong("`length` leaves no byte after sync");
-                }
-                if stream.check_from != 0 || stream.check_order.is_some() || stream.believed_after != 1 {
-                    return wrong("`check_from`, `check_order` and `believed_after` belong to a `check`");
-                }
-            }
-            (false, Some(length), Some(check)) => {
-                let around = usize::from(stream.check_from).max(stream.sync.len()) + check.length();
-                if usize::from(length) <= around {
-                    return wrong("`length` leaves no byte between sync and check");
-                }
-            }
-            (false, ..) => {
-                return wrong(
-                    "`length` and `check` are needed, or `line`: without a check a stream cannot be trusted",
-                );
-            }
-        }
-        if !(stream.rate_hz > 0.0 && stream.rate_hz <= FASTEST_HZ) {
-            return wrong("a `rate_hz` is above 0 and at most 20000");
-        }
-        if free && (starts || stream.stop.is_some() || stream.stop_before_open) {
-            return wrong(
-                "on a link of kind Serial, Tcp or Udp it runs by itself; [[init]] `send` may start it",
-            );
-        }
-        if free && !(d.query.is_empty() && d.set.is_empty()) {
-            return wrong("it leaves no room for [[query]] and [[set]] on its line");
-        }
-        if !free && starts && stream.stop.is_none() {
-            return wrong("what is started needs `stop`");
-        }
-        if !free && !starts {
-            return wrong(
-                "needs `start_register` or `start_function`; one that runs by itself is of kind `serial`, `tcp` or `udp`",
-            );
-        }
-        if stream.stop_before_open && stream.stop.is_none() {
-            return wrong("`stop_before_open` needs `stop`");
-        }
-        if d.poll.iter().any(|poll| poll.rate_hz.is_some()) {
-            return wrong("while it runs nothing is polled: polls can be read `once`");
-        }
-        Ok(())
+        let (line, length, check) = (stream.line.is_some(), stream.length.map(usize::from), stream.check);
+        let (sync, check_from) = (stream.sync.len(), usize::from(stream.check_from));
+        let around = check.map(|check| check_from.max(sync) + check.length());
+        let why = if line && !(free && length.is_none() && check.is_none() && sync == 0) {
+            "`line` is for links of kind Serial, Tcp and Udp, and goes without length, check and sync"
+        } else if !line && (length.is_none() || check.is_none() && d.link.kind != LinkKind::Udp) {
+            "`length` and `check` are needed, or `line`: without a check a stream cannot be trusted"
+        } else if check.is_none() && length.is_some_and(|length| length <= sync) {
+            "`length` leaves no byte after sync"
+        } else if check.is_none()
+            && !line
+            && (check_from != 0 || stream.check_order.is_some() || stream.believed_after != 1)
+        {
+            "`check_from`, `check_order` and `believed_after` belong to a `check`"
+        } else if length.zip(around).is_some_and(|(length, around)| length <= around) {
+            "`length` leaves no byte between sync and check"
+        } else if !(stream.rate_hz > 0.0 && stream.rate_hz <= FASTEST_HZ) {
+            "a `rate_hz` is above 0 and at most 20000"
+        } else if free && (starts || stream.stop.is_some() || stream.stop_before_open) {
+            "on a link of kind Serial, Tcp or Udp it runs by itself; [[init]] `send` may start it"
+        } else if free && !(d.query.is_empty() && d.set.is_empty()) {
+            "it leaves no room for [[query]] and [[set]] on its line"
+        } else if !free && starts && stream.stop.is_none() {
+            "what is started needs `stop`"
+        } else if !free && !starts {
+            "needs `start_register` or `start_function`; one that runs by itself is of kind `serial`, `tcp` or `udp`"
+        } else if stream.stop_before_open && stream.stop.is_none() {
+            "`stop_before_open` needs `stop`"
+        } else if d.poll.iter().any(|poll| poll.rate_hz.is_some()) {
+            "while it runs nothing is polled: polls can be read `once`"
+        } else {
+            return Ok(());
+        };
+        self.refuse("[stream]", format!("[stream]: {why}"))
     }
 
     /// Counters stand in the frames that they count, and every number of a line has its signal.
@@ -142,7 +113,7 @@ impl Compiler<'_> {
             let stands = |name: &str| placed(name).is_some();
             // A number in a line of text is stored as a float.
             let counts =
-                |name: &str| placed(name).is_some_and(|(_, s)| frame.text.is_some() || s.has_counts());
+                |name: &str| placed(name).is_some_and(|(_, s)| frame.text.is_some() || s.place.has_counts());
             let wrong_counter = counter.filter(|name| !counts(name)).map(|name| ("sequence", name));
             let wrong_clock = clock.filter(|name| !stands(name)).map(|name| ("device_time", name));
             if let Some((key, name)) = wrong_counter.or(wrong_clock) {
