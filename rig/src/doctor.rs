@@ -7,13 +7,13 @@ mod follow;
 mod judge;
 mod ports;
 
-pub use follow::{ChannelReport, Follow, Seen};
+pub use follow::{ChannelReport, Follow};
 pub use judge::{Finding, Target, judge};
 
 use drivers::{HealthReport, InstrumentSetup, InstrumentsSetup, OpenError};
 use ports::Opened;
 use realtime::cycle::{COMMANDS_PER_CYCLE, Config, CycleState, Inputs, decide};
-use realtime::ports::{AmplifierState, Channel, Contacts, Nanos, NoData, StageState, SupplyState};
+use realtime::ports::{AmplifierState, Channel, Nanos, NoData, Quality, Sample};
 use realtime::safety::{Cause, ChannelTiming, Observation, Timing};
 use realtime::stall_monitor::{StallMonitor, StallReport};
 use runs::setup::Setup;
@@ -65,36 +65,21 @@ pub struct Found {
 pub struct Look {
     /// Each instrument, in the order of the setup.
     pub found: Vec<Found>,
-    /// The last state of the amplifier, where it could be opened.
-    pub amplifier: Option<Result<AmplifierState, NoData>>,
-    /// The last state of the stage.
-    pub stage: Option<Result<StageState, NoData>>,
-    /// The last state of the second switch-off channel.
-    pub supply: Option<Result<SupplyState, NoData>>,
-    /// The last readings of the safety contacts.
-    pub contacts: Option<Contacts>,
+    /// What was seen last of all; of what could not be opened [`NoData::NotFitted`].
+    pub seen: Observation,
     /// The rule that most often prevented arming, with the share of cycles in which any did; if all opened.
     pub blocking: Option<(Cause, f64)>,
     /// Stalls of this computer during the look: what the links lost then is not their fault.
     pub stalls: StallReport,
 }
 
-fn of_channel(channel: Channel) -> Result<Seen, NoData> {
-    channel.map(|r| Seen {
-        value: r.value,
-        raw: Some(r.raw),
-        taken_at: r.taken_at,
-        sequence: r.sequence,
-        quality: r.quality,
-    })
-}
-
-fn of_state(value: f64, taken_at: Nanos, sequence: u32) -> Seen {
-    Seen { value, raw: None, taken_at, sequence, quality: realtime::ports::Quality::Good }
+/// A state as a sample. Its number stands for the raw counts that it does not have: states are never repeats.
+fn of_state(value: f64, taken_at: Nanos, sequence: u32) -> Sample {
+    Sample { value, raw: i64::from(sequence), taken_at, sequence, quality: Quality::Good }
 }
 
 /// What a channel is and shows: the instrument that it is of, its name, its unit, its timing, what was seen.
-type Shown = (Role, &'static str, &'static str, fn(&Timing) -> &ChannelTiming, Result<Seen, NoData>);
+type Shown = (Role, &'static str, &'static str, fn(&Timing) -> &ChannelTiming, Channel);
 
 fn channels(seen: &Observation) -> [Shown; 9] {
     let (f, a, s, c) = (&seen.forces, seen.amplifier, seen.stage, seen.contacts);
@@ -107,11 +92,11 @@ fn channels(seen: &Observation) -> [Shown; 9] {
     let fitted = fitted.unwrap_or(Err(NoData::NotFitted));
     let contacts = fitted.map(|c| of_state(f64::from(c.closed), c.taken_at, c.sequence));
     [
-        ("force", "lateral", "N", |t| &t.lateral, of_channel(f.lateral)),
-        ("force", "normal", "N", |t| &t.normal, of_channel(f.normal)),
+        ("force", "lateral", "N", |t| &t.lateral, f.lateral),
+        ("force", "normal", "N", |t| &t.normal, f.normal),
         ("amplifier", "output", "1", |t| &t.amplifier, output),
-        ("amplifier", "amplitude", "m", |t| &t.amplifier, a.and_then(|a| of_channel(a.amplitude))),
-        ("amplifier", "temperature", "degC", |t| &t.amplifier, a.and_then(|a| of_channel(a.temperature_c))),
+        ("amplifier", "amplitude", "m", |t| &t.amplifier, a.and_then(|a| a.amplitude)),
+        ("amplifier", "temperature", "degC", |t| &t.amplifier, a.and_then(|a| a.temperature_c)),
         ("stage", "position", "m", |t| &t.stage, position),
         ("stage", "velocity", "m/s", |t| &t.stage, velocity),
         ("supply_relay", "closed", "1", |t| &t.supply, closed),
@@ -147,7 +132,7 @@ fn reports(
 impl Look {
     /// Whether a relay is fitted in the amplifier's supply and reads open.
     fn supply_is_open(&self) -> bool {
-        self.supply.is_some_and(|supply| supply.is_ok_and(|supply| supply.cut))
+        self.seen.supply.is_ok_and(|supply| supply.cut)
     }
 }
 
@@ -235,15 +220,7 @@ pub fn look(setup: &Setup, instruments: &InstrumentsSetup) -> Look {
         },
         answers: o.link.map(|_link| answers(o.instrument, before, after, seconds)),
     });
-    Look {
-        found: found.collect(),
-        amplifier: bench.amplifier.map(|_| last.amplifier),
-        stage: bench.stage.map(|_| last.stage),
-        supply: bench.supply.map(|_| last.supply),
-        contacts: bench.contacts.map(|_| last.contacts),
-        blocking: rules.worst().filter(|_| whole),
-        stalls,
-    }
+    Look { found: found.collect(), seen: last, blocking: rules.worst().filter(|_| whole), stalls }
 }
 
 fn answers(

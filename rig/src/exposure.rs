@@ -207,7 +207,7 @@ impl Ledger {
     pub fn keep(self, life: Arc<Lifeline>, stop: impl Fn() + Send + 'static) -> io::Result<Keeping> {
         let (end, ended) = channel::<bool>();
         let state = Arc::new(State::default());
-        state.written(machine_time()?.1);
+        state.written_ns.store(machine_time()?.1, Ordering::Relaxed);
         let shown = Arc::clone(&state);
         let session = tracing::Span::current();
         let keep = move || {
@@ -232,7 +232,7 @@ impl Ledger {
                     .map(|()| now_ns)
                 });
                 match written {
-                    Ok(now_ns) => shown.written(now_ns),
+                    Ok(now_ns) => shown.written_ns.store(now_ns, Ordering::Relaxed),
                     Err(why) => {
                         tracing::error!(%why, "the exposure of the finger cannot be saved: the rig is stopped");
                         shown.failed.store(true, Ordering::Relaxed);
@@ -277,8 +277,7 @@ impl Book {
         let (boot, now_ns) =
             machine_time().map_err(|e| miette::miette!("this machine tells no time: {e}"))?;
         let stem = format!("muprime-{}-", &calibration::certificate::sha256_hex(of.as_bytes())[..16]);
-        // SAFETY: it reads a number of this process and cannot fail.
-        let user = unsafe { libc::geteuid() };
+        let user = rustix::process::geteuid().as_raw();
         let path = folder.join(format!("{stem}{user}.exposure"));
         let file = open_owned(&path, user, true).map_err(|e| {
             miette::miette!(help = "see what it is, and remove it", "{}: {e}", path.display())
@@ -370,12 +369,6 @@ fn open_owned(path: &Path, owner: u32, own: bool) -> io::Result<File> {
 struct State {
     failed: AtomicBool,
     written_ns: AtomicU64,
-}
-
-impl State {
-    fn written(&self, now_ns: u64) {
-        self.written_ns.store(now_ns, Ordering::Relaxed);
-    }
 }
 
 /// A ledger in use.

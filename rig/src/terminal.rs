@@ -15,7 +15,7 @@ use std::sync::{Mutex, Once, PoisonError};
 use std::time::Duration;
 
 /// The other screen, and back to the one that was there before: no attributes, the cursor shown.
-const ENTER: &[u8] = b"\x1b[?1049h\x1b[?25l\x1b[2J";
+pub(crate) const ENTER: &[u8] = b"\x1b[?1049h\x1b[?25l\x1b[2J";
 const LEAVE: &[u8] = b"\x1b[0m\x1b[?25h\x1b[?1049l";
 /// A terminal that takes nothing for so long keeps nobody from leaving.
 const PATIENCE: Duration = Duration::from_millis(500);
@@ -125,11 +125,6 @@ pub fn show() -> Result<(), String> {
     SHOWN.store(true, Ordering::SeqCst);
     // A terminal that takes nothing now may do so later: the picture's own thread waits for it.
     Ok(())
-}
-
-/// What a picture's screen begins with.
-pub(crate) const fn beginning() -> &'static [u8] {
-    ENTER
 }
 
 /// Whether a picture may be drawn: it is up, and was not given back.

@@ -17,7 +17,7 @@ use realtime::ports::Nanos;
 use realtime::queue::CommandQueue;
 use realtime::turn::{Ports, Row};
 use ringbuf::traits::{Consumer, Split};
-use ringbuf::{HeapCons, HeapProd, HeapRb};
+use ringbuf::{HeapCons, HeapRb};
 use runs::supervisor::{Loop, OffReport};
 use std::collections::BTreeMap;
 use std::sync::Arc;
@@ -84,18 +84,6 @@ impl WallLoop {
     pub fn start(parts: Parts) -> miette::Result<(Self, LoopHandle, HeapCons<Row>)> {
         let (rows, record) = HeapRb::<Row>::new(RING).split();
         let (watch, watched) = HeapRb::<Row>::new(RING).split();
-        let rig = Self::start_into(parts, rows, watch)?;
-        let handle = LoopHandle {
-            commands: Arc::clone(&rig.commands),
-            life: Arc::clone(&rig.life),
-            watch: watched,
-            heard: rig.clock.now(),
-            clock: rig.clock.join(SWEEP_SLACK),
-        };
-        Ok((rig, handle, record))
-    }
-
-    fn start_into(parts: Parts, rows: HeapProd<Row>, watch: HeapProd<Row>) -> miette::Result<Self> {
         let Parts { config, model, ports, links, pacing, origin_ns } = parts;
         let commands = Arc::new(CommandQueue::new(QUEUE));
         let life = Arc::new(Lifeline::default());
@@ -113,17 +101,19 @@ impl WallLoop {
         let parts = LoopParts { config, model, ports, commands, rows, watch, life, origin_ns, held };
         let run = move || pacing::run(parts, pacing);
         rig.looping = Some(std::thread::Builder::new().name("loop".into()).spawn(run).into_diagnostic()?);
-        Ok(rig)
+        let handle = LoopHandle {
+            commands: Arc::clone(&rig.commands),
+            life: Arc::clone(&rig.life),
+            watch: watched,
+            heard: rig.clock.now(),
+            clock: rig.clock.join(SWEEP_SLACK),
+        };
+        Ok((rig, handle, record))
     }
 
     /// The loop's signs of life, for whoever watches it from another thread.
     pub fn life(&self) -> Arc<Lifeline> {
         Arc::clone(&self.life)
-    }
-
-    /// Stops the rig at once; the loop goes on, and shows it.
-    pub fn stop(&self) {
-        self.commands.stop();
     }
 
     /// Hands a command to the loop. False: the loop does not live any more.
@@ -147,7 +137,7 @@ impl WallLoop {
     /// The stop goes out, a few more cycles carry it to the links, and the loop ends.
     fn end_loop(&mut self) -> Option<LoopReport> {
         let looping = self.looping.take()?;
-        self.stop();
+        self.commands.stop();
         let beat = || self.life.heartbeat.load(Ordering::Relaxed);
         let enough = beat() + CYCLES_TO_STOP;
         let until = |limit: Nanos, done: &dyn Fn() -> bool| {

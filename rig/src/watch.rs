@@ -16,13 +16,13 @@ mod render;
 mod source;
 mod style;
 
-pub use keys::Lead;
 pub use page::{Page, draw};
 pub use style::Look;
 
 use crate::live::View;
 use crate::terminal::{self, CtrlC};
 use keys::Hand;
+use runs::session::Signals;
 use std::path::{Path, PathBuf};
 use std::sync::atomic::{AtomicBool, Ordering};
 use std::sync::mpsc::{Receiver, channel};
@@ -100,13 +100,14 @@ pub struct Watch {
 }
 
 impl Watch {
-    /// Shows the run in a folder, which need not be there yet where this process leads it.
+    /// Shows the run in a folder; `lead` are the signals of one that this process leads, whose folder need not
+    /// be there yet.
     ///
     /// # Errors
     /// No terminal, or no thread can be had.
-    pub fn begin(folder: &Path, lead: Lead, dead_man: bool) -> miette::Result<Self> {
+    pub fn begin(folder: &Path, lead: Option<Signals>, dead_man: bool) -> miette::Result<Self> {
         let refused = |why: String| miette::miette!("{why}");
-        let own = matches!(lead, Lead::Own(_));
+        let own = lead.is_some();
         let ctrl_c = if own { CtrlC::Signal } else { CtrlC::Key };
         // The screen first: where it is refused, no keys were taken.
         terminal::show().map_err(refused)?;
@@ -114,7 +115,7 @@ impl Watch {
         let keys = if dead_man { Keys::DeadMan } else { listen() };
         let (view, source) = (View::default(), Source::default());
         let seen = Seen { view, source, heard: Instant::now(), note: None, help: false };
-        let (hand, seen) = (Hand::of(lead), Mutex::new(seen));
+        let (hand, seen) = (Hand { own: lead, feed: Mutex::default() }, Mutex::new(seen));
         let shared = Shared { folder: folder.into(), seen, over: AtomicBool::new(false), hand, keys, own };
         let shared = Arc::new(shared);
         let (done, painted) = channel();

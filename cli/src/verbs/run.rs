@@ -11,7 +11,7 @@ use realtime::ports::Nanos;
 use rig::dashboard::LISTEN;
 use rig::live::{self, Feed};
 use rig::publish::{Broker, Publisher};
-use rig::watch::{Lead, Watch};
+use rig::watch::Watch;
 use runs::catalogue::runs_folder;
 use runs::files::{Made, make_folder};
 use runs::plan::Plan;
@@ -153,7 +153,7 @@ fn measure(job: Job, planned: usize, args: &Args, json: bool) -> miette::Result<
     watch_signals(&signals)?;
     // Up before anything moves, and down before the summary. Output in between is held and printed then.
     let watch = match args.tui {
-        true => Some(Watch::begin(&job.out, Lead::Own(signals.clone()), job.setup.hand_at_key())?),
+        true => Some(Watch::begin(&job.out, Some(signals.clone()), job.setup.hand_at_key())?),
         false => None,
     };
     let mut followers = Followers::begin(&job, planned, args, json)?;

@@ -1,7 +1,7 @@
 //! `muprime watch RUN`: follows a run, at a terminal with the live view, else line by line from its journal.
 
 use super::prelude::*;
-use rig::watch::{Lead, Watch};
+use rig::watch::Watch;
 use runs::catalogue::{existing, runs_folder};
 use runs::sequence::MeasuredPass;
 use signal_hook::consts::{SIGHUP, SIGINT, SIGTERM};
@@ -26,7 +26,7 @@ pub fn run(args: Args, json: bool) -> miette::Result<ExitCode> {
     if !json && std::io::stdout().is_terminal() && rig::terminal::has_keys().is_ok() {
         // A signal takes the view down, and nothing else: the run is another process's.
         studies::progress::on_signals(&[SIGINT, SIGTERM, SIGHUP], || runs::leave::leave_now(DONE))?;
-        Watch::begin(&run, Lead::Other, false)?.wait();
+        Watch::begin(&run, None, false)?.wait();
         return exit(DONE);
     }
     let mut reader = BufReader::new(file);

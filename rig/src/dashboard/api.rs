@@ -29,6 +29,9 @@ const LONGEST_LOOP_S: f64 = 3.2e7;
 const POLICY: &str = "default-src 'none'; script-src 'self'; style-src 'self' 'unsafe-inline'; img-src 'self' data:; \
                       connect-src 'self'; frame-src 'self'; base-uri 'none'; form-action 'none'; frame-ancestors 'none'";
 
+/// What a handler has of the server.
+type Server = State<Arc<Shared>>;
+
 /// The addresses.
 pub fn routes(shared: Arc<Shared>) -> Router {
     let data = Router::new()
@@ -68,7 +71,7 @@ async fn asset(kind: &'static str, text: &str) -> Response {
 }
 
 /// Before everything else: the right host, and no foreign page; after everything, what a browser is to keep to.
-async fn at_this_place(State(shared): State<Arc<Shared>>, request: Request, next: Next) -> Response {
+async fn at_this_place(State(shared): Server, request: Request, next: Next) -> Response {
     let stream = request.uri().path().starts_with("/foxglove");
     let mut response = match shared.guard.place(request.headers(), stream) {
         Ok(()) => next.run(request).await,
@@ -98,7 +101,7 @@ async fn with_body(request: Request, next: Next) -> Response {
 }
 
 /// Before data: the token.
-async fn with_token(State(shared): State<Arc<Shared>>, request: Request, next: Next) -> Response {
+async fn with_token(State(shared): Server, request: Request, next: Next) -> Response {
     // Foxglove has an address alone to give, and Prometheus may have a header or an address.
     let uri = request.uri();
     let programs = uri.path() == "/metrics" || uri.path().starts_with("/foxglove");
@@ -124,12 +127,12 @@ pub async fn beside<T: Send + 'static>(work: impl FnOnce() -> T + Send + 'static
     tokio::task::spawn_blocking(work).await.map_err(|_| StatusCode::INTERNAL_SERVER_ERROR.into_response())
 }
 
-async fn about(State(shared): State<Arc<Shared>>) -> Response {
+async fn about(State(shared): Server) -> Response {
     let version = env!("CARGO_PKG_VERSION");
     Json(serde_json::json!({ "version": version, "control": shared.options.control })).into_response()
 }
 
-async fn runs(State(shared): State<Arc<Shared>>) -> Result<Response, Response> {
+async fn runs(State(shared): Server) -> Result<Response, Response> {
     let found = beside(move || pages::runs(&shared.options.runs)).await?;
     Ok(found.map_or_else(|why| failed_to(&why), |runs| Json(runs).into_response()))
 }
@@ -139,7 +142,7 @@ fn folder(shared: &Shared, name: &str) -> Result<std::path::PathBuf, Response> {
     shared.folder(name).ok_or_else(|| StatusCode::NOT_FOUND.into_response())
 }
 
-async fn run(State(shared): State<Arc<Shared>>, Path(name): Path<String>) -> Result<Response, Response> {
+async fn run(State(shared): Server, Path(name): Path<String>) -> Result<Response, Response> {
     folder(&shared, &name)?;
     let (diagnosing, failed) = {
         let diagnoses = shared.diagnoses.lock().unwrap_or_else(PoisonError::into_inner);
@@ -150,7 +153,7 @@ async fn run(State(shared): State<Arc<Shared>>, Path(name): Path<String>) -> Res
     Ok(found.map_or_else(|why| failed_to(&why), |run| Json(answer(run)).into_response()))
 }
 
-async fn report(State(shared): State<Arc<Shared>>, Path(name): Path<String>) -> Result<Response, Response> {
+async fn report(State(shared): Server, Path(name): Path<String>) -> Result<Response, Response> {
     let folder = folder(&shared, &name)?;
     let found = beside(move || runs::report::html(&folder)).await?;
     Ok(found.map_or_else(|why| failed_to(&why), html))
@@ -167,7 +170,7 @@ struct WindowS {
 /// The recorded cycles of a window, as finely as a screen shows them. One window is read at a time: the
 /// record of hours is long.
 async fn cycles(
-    State(shared): State<Arc<Shared>>,
+    State(shared): Server,
     Path(name): Path<String>,
     Query(WindowS { from_s, to_s }): Query<WindowS>,
 ) -> Result<Response, Response> {
@@ -183,7 +186,7 @@ async fn cycles(
 }
 
 async fn file(
-    State(shared): State<Arc<Shared>>,
+    State(shared): Server,
     Path((name, file)): Path<(String, String)>,
 ) -> Result<Response, Response> {
     let folder = folder(&shared, &name)?;
@@ -192,7 +195,7 @@ async fn file(
 }
 
 async fn annotate(
-    State(shared): State<Arc<Shared>>,
+    State(shared): Server,
     Path(name): Path<String>,
     Json(annotations): Json<Annotations>,
 ) -> Result<StatusCode, Response> {
@@ -204,10 +207,7 @@ async fn annotate(
 
 /// Begins a diagnosis beside everything else. While any run of the folder goes on there is none: it
 /// would take that loop's processor.
-async fn diagnose(
-    State(shared): State<Arc<Shared>>,
-    Path(name): Path<String>,
-) -> Result<StatusCode, Response> {
+async fn diagnose(State(shared): Server, Path(name): Path<String>) -> Result<StatusCode, Response> {
     shared.guard.count().map_err(IntoResponse::into_response)?;
     let folder = folder(&shared, &name)?;
     let refused = |why: &str| (StatusCode::CONFLICT, why.to_string()).into_response();
@@ -238,7 +238,7 @@ async fn diagnose(
 }
 
 async fn page(
-    State(shared): State<Arc<Shared>>,
+    State(shared): Server,
     Path((name, page)): Path<(String, String)>,
 ) -> Result<Response, Response> {
     let folder = folder(&shared, &name)?;
@@ -255,10 +255,7 @@ struct Several {
     by: Option<GroupBy>,
 }
 
-async fn compare(
-    State(shared): State<Arc<Shared>>,
-    Query(several): Query<Several>,
-) -> Result<Response, Response> {
+async fn compare(State(shared): Server, Query(several): Query<Several>) -> Result<Response, Response> {
     let names = several.runs.split('/');
     let folders = names.map(|name| folder(&shared, name)).collect::<Result<Vec<_>, _>>()?;
     if !(2..=MOST_COMPARED).contains(&folders.len()) {
@@ -281,7 +278,7 @@ struct ControlRequest {
 }
 
 async fn ask(
-    State(shared): State<Arc<Shared>>,
+    State(shared): Server,
     Path(name): Path<String>,
     Json(ControlRequest { ask }): Json<ControlRequest>,
 ) -> Result<StatusCode, Response> {

@@ -1,25 +1,10 @@
 //! One channel, followed: its rate, ages, noise, and what it shows that is no value.
 
 use realtime::estimate::Moments;
-use realtime::ports::{Nanos, NoData, Quality};
+use realtime::ports::{Channel, Nanos, NoData, Quality, Sample};
 use realtime::safety::ChannelTiming;
 use runs::report::human::quantity;
 use serde::Serialize;
-
-/// What was seen of a channel in one look of the loop.
-#[derive(Clone, Copy, Debug)]
-pub struct Seen {
-    /// The value in SI units.
-    pub value: f64,
-    /// What the instrument sent, where that is known.
-    pub raw: Option<i64>,
-    /// When it was taken.
-    pub taken_at: Nanos,
-    /// Its number.
-    pub sequence: u32,
-    /// What the instrument says of it.
-    pub quality: Quality,
-}
 
 /// Follows a channel while it is looked at as the loop does.
 #[derive(Clone, Debug, Default)]
@@ -27,7 +12,7 @@ pub struct Follow {
     looks: u64,
     invalid: u64,
     missing: Option<NoData>,
-    last: Option<Seen>,
+    last: Option<Sample>,
     values: Moments,
     saturated: u64,
     equal_in_a_row: u32,
@@ -68,7 +53,7 @@ pub struct ChannelReport {
 
 impl Follow {
     /// One look of the loop.
-    pub fn look(&mut self, seen: Result<Seen, NoData>, now: Nanos) {
+    pub fn look(&mut self, seen: Channel, now: Nanos) {
         self.looks += 1;
         let seen = match seen {
             Ok(seen) => seen,
@@ -87,8 +72,7 @@ impl Follow {
         }
         self.values.push(seen.value);
         self.saturated += u64::from(seen.quality == Quality::Saturated);
-        let equal = seen.raw.is_some() && last.raw == seen.raw;
-        self.equal_in_a_row = if equal { self.equal_in_a_row + 1 } else { 1 };
+        self.equal_in_a_row = if last.raw == seen.raw { self.equal_in_a_row + 1 } else { 1 };
         self.equal_most = self.equal_most.max(self.equal_in_a_row);
     }
 
@@ -155,10 +139,10 @@ impl ChannelReport {
 mod tests {
     use super::*;
 
-    fn seen(sequence: u32, raw: i64, at_ms: u64) -> Result<Seen, NoData> {
-        Ok(Seen {
+    fn seen(sequence: u32, raw: i64, at_ms: u64) -> Channel {
+        Ok(Sample {
             value: raw as f64 * 1e-3,
-            raw: Some(raw),
+            raw,
             taken_at: Nanos(at_ms * 1_000_000),
             sequence,
             quality: if raw > 100 { Quality::Saturated } else { Quality::Good },

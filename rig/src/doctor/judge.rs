@@ -2,7 +2,7 @@
 
 use super::{Answers, ChannelReport, Found, Look};
 use drivers::OpenError;
-use realtime::ports::{AmplifierState, Contact, NoData, Sample, StageState};
+use realtime::ports::{AmplifierState, Contact, Contacts, NoData, Sample, StageState};
 use realtime::safety::RULES;
 use runs::plan::Plan;
 use runs::report::human::quantity;
@@ -132,9 +132,9 @@ fn instrument(found: &Found, look: &Look, target: &Target<'_>) -> Finding {
     };
     let mut problems: Vec<Problem> = Vec::new();
     let mut states = Vec::new();
+    // What an amplifier says without its supply is not valid by its own word, and its fault is not its own.
+    let unsupplied = found.role == "amplifier" && look.supply_is_open();
     for channel in &found.channels {
-        // What an amplifier says without its supply is not valid by its own word.
-        let unsupplied = found.role == "amplifier" && look.supply_is_open();
         if !(unsupplied && channel.missing == Some(NoData::Invalid)) {
             timely(channel, &mut problems);
             saturated(channel, &mut problems);
@@ -148,22 +148,24 @@ fn instrument(found: &Found, look: &Look, target: &Target<'_>) -> Finding {
             force(channel, target, &mut problems);
         }
     }
-    match (found.role, look.amplifier, look.stage) {
-        ("amplifier", Some(state), _) => {
-            let open = look.supply_is_open();
-            states.push(amplifier(state, target.setup, open, &mut problems));
+    let no_state = |why: NoData| format!("no state: {why}");
+    match found.role {
+        "amplifier" => {
+            let shown = |s| amplifier(s, target.setup, unsupplied, &mut problems);
+            states.push(look.seen.amplifier.map_or_else(no_state, shown));
         }
-        ("stage", _, Some(state)) => states.push(stage(state, target.setup, &mut problems)),
-        ("supply_relay", ..) => {
-            let closed = look.supply.and_then(Result::ok).map(|s| !s.cut);
-            states.push(closed.map_or("no state".into(), |c| if c { "closed" } else { "open" }.to_string()));
+        "stage" => {
+            let shown = |s| stage(s, target.setup, &mut problems);
+            states.push(look.seen.stage.map_or_else(no_state, shown));
         }
-        ("safety_inputs", ..) => contacts(look, &mut states, &mut problems),
+        "supply_relay" => {
+            let shown = |cut: bool| if cut { "open" } else { "closed" };
+            states.push(look.seen.supply.map_or("no state", |supply| shown(supply.cut)).into());
+        }
+        "safety_inputs" => contacts(&look.seen.contacts, &mut states, &mut problems),
         _ => {}
     }
     linked(answers, &mut problems);
-    // Without its supply every amplifier that can shows a fault: it is not its own.
-    let unsupplied = found.role == "amplifier" && look.supply_is_open();
     if !answers.fault.is_empty() && !unsupplied {
         let advice = "look it up in its manual, and reset it at the instrument";
         problems.push((format!("it reports: {}", answers.fault), advice));
@@ -284,16 +286,7 @@ fn stated_noise(setup: &Setup, axis: &str) -> Option<f64> {
     })
 }
 
-fn amplifier(
-    state: Result<AmplifierState, NoData>,
-    setup: &Setup,
-    supply_is_open: bool,
-    problems: &mut Vec<Problem>,
-) -> String {
-    let s = match state {
-        Ok(s) => s,
-        Err(why) => return format!("no state: {why}"),
-    };
+fn amplifier(s: AmplifierState, setup: &Setup, supply_is_open: bool, problems: &mut Vec<Problem>) -> String {
     if s.output_on {
         problems.push(("its output is ON at rest".into(), "find who drives it, and switch it off"));
     }
@@ -317,11 +310,7 @@ fn amplifier(
     )
 }
 
-fn stage(state: Result<StageState, NoData>, setup: &Setup, problems: &mut Vec<Problem>) -> String {
-    let s = match state {
-        Ok(s) => s,
-        Err(why) => return format!("no state: {why}"),
-    };
+fn stage(s: StageState, setup: &Setup, problems: &mut Vec<Problem>) -> String {
     let (left, right) = setup.config.limits.travel_m;
     if s.fault {
         problems.push(("it reports a FAULT".into(), "read the fault on the stage, and reset it there"));
@@ -336,8 +325,7 @@ fn stage(state: Result<StageState, NoData>, setup: &Setup, problems: &mut Vec<Pr
     format!("at {}, {}", quantity(s.position_m, "m"), quantity(s.velocity_m_s, "m/s"))
 }
 
-fn contacts(look: &Look, states: &mut Vec<String>, problems: &mut Vec<Problem>) {
-    let Some(c) = look.contacts else { return };
+fn contacts(c: &Contacts, states: &mut Vec<String>, problems: &mut Vec<Problem>) {
     let mut one = |name: &str, contact: Result<Contact, NoData>, needed: bool| match contact {
         Err(NoData::NotFitted) => {}
         Err(why) => problems.push((format!("{name}: {why}"), LINK)),
@@ -410,7 +398,8 @@ fn planned(look: &Look, setup: &Setup, plan: &Plan, mended: bool) -> Finding {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use realtime::ports::Nanos;
+    use realtime::ports::{Forces, Nanos};
+    use realtime::safety::Observation;
     use realtime::stall_monitor::StallReport;
 
     #[test]
@@ -446,9 +435,16 @@ mod tests {
             channels: vec![channel],
         };
         let stalls = StallReport { count: stalls, worst: Nanos(21_400_000), latest: Vec::new() };
-        let nothing = (None, None, None, None, None);
-        let (amplifier, stage, supply, contacts, blocking) = nothing;
-        Look { found: vec![found], amplifier, stage, supply, contacts, blocking, stalls }
+        let none = NoData::NotFitted;
+        let seen = Observation {
+            forces: Forces::missing(none),
+            amplifier: Err(none),
+            stage: Err(none),
+            lateness: Nanos(0),
+            supply: Err(none),
+            contacts: Contacts::ABSENT,
+        };
+        Look { found: vec![found], seen, blocking: None, stalls }
     }
 
     #[test]

@@ -2,33 +2,13 @@
 
 use super::Role;
 use drivers::endpoint::Endpoint;
-use drivers::ports::{AmplifierPort, ContactsPort, ForcePort, Merged, StagePort, SupplyPort};
-use drivers::{HealthReport, InstrumentSetup, InstrumentsSetup, Links, OpenError};
+use drivers::ports::{AmplifierPort, ContactsPort, Merged, StagePort, SupplyPort};
+use drivers::{HealthReport, InstrumentSetup, InstrumentsSetup, Links, OpenError, SetupError};
+use instruments::Profile;
 use realtime::ports::{Amplifier, Contacts, ForceSensor, Nanos, NoData, SafetyInputs, Stage, SupplySwitch};
 use realtime::safety::Observation;
 use runs::setup::Setup;
 use std::time::Instant;
-
-enum Port {
-    Force(ForcePort, (bool, bool)),
-    Amplifier(AmplifierPort),
-    Stage(StagePort),
-    Supply(SupplyPort),
-    Contacts(ContactsPort),
-}
-
-fn open_one(role: Role, instrument: &InstrumentSetup, epoch: Instant) -> Result<(Links, Port), OpenError> {
-    let profile = instrument.description()?;
-    let (endpoint, port) = match role {
-        "force" => Endpoint::force(profile, instrument).map(|(e, (port, axes))| (e, Port::Force(port, axes))),
-        "amplifier" => Endpoint::amplifier(profile, instrument).map(|(e, port)| (e, Port::Amplifier(port))),
-        "stage" => Endpoint::stage(profile, instrument).map(|(e, port)| (e, Port::Stage(port))),
-        "supply_relay" => Endpoint::supply(profile).map(|(e, port)| (e, Port::Supply(port))),
-        _ => Endpoint::contacts(profile, instrument).map(|(e, port)| (e, Port::Contacts(port))),
-    }
-    .map_err(|problem| instrument.mismatch(problem))?;
-    Ok((drivers::open_one(instrument, endpoint, epoch)?, port))
-}
 
 /// An instrument, and its link where it could be opened.
 pub struct Opened<'a> {
@@ -63,47 +43,54 @@ pub struct Bench {
     pub contacts: Option<ContactsPort>,
 }
 
+/// Opens one instrument beside those that are open; its port where that worked.
+fn open_one<'a, Port>(
+    all: &mut Vec<Opened<'a>>,
+    (role, instrument): (Role, &'a InstrumentSetup),
+    epoch: Instant,
+    endpoint: impl FnOnce(Profile) -> Result<(Endpoint, Port), SetupError>,
+) -> Option<Port> {
+    let opened = instrument.description().and_then(|profile| {
+        let (endpoint, port) = endpoint(profile).map_err(|problem| instrument.mismatch(problem))?;
+        Ok((drivers::open_one(instrument, endpoint, epoch)?, port))
+    });
+    let (link, port) = match opened {
+        Ok((links, port)) => (Ok(links), Some(port)),
+        Err(error) => (Err(error), None),
+    };
+    all.push(Opened { role, instrument, axes: (false, false), link });
+    port
+}
+
 /// Opens every instrument; one that fails keeps none of the others from being opened.
 pub fn open<'a>(
     setup: &Setup,
     instruments: &'a InstrumentsSetup,
     epoch: Instant,
 ) -> (Vec<Opened<'a>>, Bench) {
-    let force = instruments.force.iter().map(|i| ("force", i));
-    let others = [("amplifier", &instruments.amplifier), ("stage", &instruments.stage)];
-    let relay = instruments.supply_relay.iter().map(|i| ("supply_relay", i));
-    let inputs = instruments.safety_inputs.iter().map(|i| ("safety_inputs", i));
-    let mut forces = Vec::new();
-    let mut bench = Bench {
-        force: Box::new(Merged(Vec::new())),
-        amplifier: None,
-        stage: None,
-        supply: None,
-        contacts: None,
-    };
-    let mut one = |(role, instrument): (Role, &'a InstrumentSetup)| {
-        let mut axes = (false, false);
-        let link = open_one(role, instrument, epoch).map(|(links, port)| {
-            match port {
-                Port::Force(port, given) => {
-                    axes = given;
-                    forces.push((port, given));
-                }
-                Port::Amplifier(port) => bench.amplifier = Some(port),
-                Port::Stage(port) => bench.stage = Some(port),
-                Port::Supply(port) => bench.supply = Some(port),
-                Port::Contacts(port) => bench.contacts = Some(port),
-            }
-            links
-        });
-        Opened { role, instrument, axes, link }
-    };
-    let all: Vec<Opened<'a>> = force.chain(others).chain(relay).chain(inputs).map(&mut one).collect();
+    let (mut all, mut forces) = (Vec::new(), Vec::new());
+    for own in &instruments.force {
+        let opened = open_one(&mut all, ("force", own), epoch, |profile| Endpoint::force(profile, own));
+        if let (Some((port, axes)), Some(own)) = (opened, all.last_mut()) {
+            own.axes = axes;
+            forces.push((port, axes));
+        }
+    }
+    let own = &instruments.amplifier;
+    let amplifier =
+        open_one(&mut all, ("amplifier", own), epoch, |profile| Endpoint::amplifier(profile, own));
+    let own = &instruments.stage;
+    let stage = open_one(&mut all, ("stage", own), epoch, |profile| Endpoint::stage(profile, own));
+    let relay = instruments.supply_relay.as_ref();
+    let supply = relay.and_then(|own| open_one(&mut all, ("supply_relay", own), epoch, Endpoint::supply));
+    let contacts = instruments.safety_inputs.as_ref().and_then(|own| {
+        open_one(&mut all, ("safety_inputs", own), epoch, |profile| Endpoint::contacts(profile, own))
+    });
     let merged: Box<dyn ForceSensor> = Box::new(Merged(forces));
     // A certificate speaks of both axes.
     let whole = all.iter().all(|o| o.link.is_ok());
-    bench.force = if whole { setup.certificates.calibrated(merged) } else { merged };
-    (all, bench)
+    let force = if whole { setup.certificates.calibrated(merged) } else { merged };
+    (all, Bench { force, amplifier, stage, supply, contacts })
 }
 
 impl Bench {

@@ -9,32 +9,17 @@ use std::path::Path;
 use std::sync::atomic::Ordering;
 use std::sync::{Mutex, PoisonError};
 
-/// Who leads the run that is shown.
-pub enum Lead {
-    /// This process, through these signals.
-    Own(Signals),
-    /// Another process.
-    Other,
-}
-
 /// A way to ask a run through its feed.
 pub(super) type Asking = Box<dyn FnMut(Ask) -> io::Result<()> + Send>;
 
 /// The way from the keys to the run.
 pub(super) struct Hand {
-    own: Option<Signals>,
-    feed: Mutex<Option<Asking>>,
+    /// The signals of a run that this process leads.
+    pub own: Option<Signals>,
+    pub feed: Mutex<Option<Asking>>,
 }
 
 impl Hand {
-    pub fn of(lead: Lead) -> Self {
-        let own = match lead {
-            Lead::Own(signals) => Some(signals),
-            Lead::Other => None,
-        };
-        Hand { own, feed: Mutex::default() }
-    }
-
     /// Sets the feed for requests to the run; `None` where its feed is gone.
     pub fn reach(&self, feed: Option<Asking>) {
         *self.feed.lock().unwrap_or_else(PoisonError::into_inner) = feed;

@@ -57,7 +57,7 @@ impl Screen {
         let area = Rect::new(0, 0, width, height);
         let mut bytes = Vec::new();
         if self.shown.as_ref().is_none_or(|shown| shown.area != area) {
-            bytes.extend_from_slice(terminal::beginning());
+            bytes.extend_from_slice(terminal::ENTER);
             self.shown = Some(Buffer::empty(area));
         }
         let page = page(area);
