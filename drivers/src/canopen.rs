@@ -28,7 +28,9 @@ const NOT_ENABLED: u16 = 0x07;
 pub(crate) fn spawn(instrument: &InstrumentSetup, session: Session) -> Result<JoinHandle<Closed>, Ended> {
     let link = session.endpoint.profile().description.link.clone();
     let address = instrument.address.clone();
-    let node = instrument.base.and_then(|base| u8::try_from(base).ok()).or(link.node).unwrap_or(1);
+    let node = instrument.base.or(link.node.map(u32::from)).unwrap_or(1);
+    let node = u8::try_from(node).ok().filter(|node| (1..=127).contains(node));
+    let node = node.ok_or_else(|| Ended::Io("CANopen has the nodes 1 to 127: correct `base`".into()))?;
     session.spawn(move |session| {
         let port = can::open(&address, link.bitrate.unwrap_or(1_000_000))?;
         let health = session.endpoint.health();
@@ -94,10 +96,18 @@ impl Master {
         }
     }
 
+    /// The next event. A frame of 29 bits is none of CANopen's, whatever its number.
+    fn receive(&mut self, deadline: Instant) -> Result<Option<CanEvent>, Ended> {
+        Ok(match self.port.receive(deadline)? {
+            Some(CanEvent::Frame(frame, _)) if frame.extended => Some(CanEvent::Other),
+            event => event,
+        })
+    }
+
     fn sdo(&mut self, request: &CanFrame, index: u16, sub: u8) -> Result<SdoAnswer, Ended> {
         self.send(request)?;
         let deadline = Instant::now() + Duration::from_millis(u64::from(self.limit_ms));
-        while let Some(event) = self.port.receive(deadline)? {
+        while let Some(event) = self.receive(deadline)? {
             match event {
                 CanEvent::Frame(frame, _) => {
                     if let Some(answer) = canopen::sdo_answer(&frame, self.node, index, sub) {
@@ -182,7 +192,7 @@ impl Master {
                 write.advance(session.now());
             }
             let pause = Duration::from_nanos(write.due.since(session.now()).0).min(LONGEST_SLEEP);
-            match self.port.receive(Instant::now() + pause)? {
+            match self.receive(Instant::now() + pause)? {
                 Some(CanEvent::Frame(frame, _)) if frame.id == self.map.cob => {
                     alive = Instant::now();
                     let arrived = session.now();
@@ -218,7 +228,9 @@ impl Master {
             let _ = session.endpoint.profile().encode_set(*set, *value, &mut self.block);
         }
         self.block[..2].copy_from_slice(&control.to_le_bytes());
-        CanFrame::new(self.map.out, &self.block).map_or(Ok(()), |frame| self.send(&frame))
+        let frame = CanFrame::new(self.map.out, &self.block);
+        let none = || Ended::Io("its set-points are more than the 8 bytes of a frame".into());
+        self.send(&frame.ok_or_else(none)?)
     }
 }
 
@@ -246,7 +258,7 @@ impl OffWay for Master {
 
     fn read_state(&mut self, session: &mut Session) -> Result<(), Ended> {
         let deadline = Instant::now() + Duration::from_millis(u64::from(self.limit_ms));
-        while let Some(event) = self.port.receive(deadline)? {
+        while let Some(event) = self.receive(deadline)? {
             if let CanEvent::Frame(frame, _) = event
                 && frame.id == self.map.cob
             {
@@ -286,20 +298,70 @@ mod tests {
         }
     }
 
+    fn stage() -> InstrumentSetup {
+        let dead_weight_n = Some(0.25);
+        InstrumentSetup { dead_weight_n, ..InstrumentSetup::new("cia402-profile-velocity", "none") }
+    }
+
+    fn session() -> Session {
+        let endpoint = Endpoint::stage(crate::profile(&stage().profile).unwrap(), &stage()).unwrap().0;
+        Session::new(endpoint, Instant::now(), Arc::default(), std::sync::mpsc::sync_channel(1).0)
+    }
+
+    fn master(session: &Session, port: impl CanPort + 'static) -> Master {
+        let map = Map::of(session, 5).unwrap();
+        let block = vec![0; map.length];
+        Master { port: Box::new(port), node: 5, limit_ms: 20, map, block, tries: 0 }
+    }
+
+    /// A bus with one frame of 29 bits whose number is that of the drive's own.
+    struct Foreign(Option<CanFrame>);
+
+    impl CanPort for Foreign {
+        fn send(&mut self, _: &CanFrame) -> std::io::Result<bool> {
+            Ok(true)
+        }
+
+        fn receive(&mut self, _: Instant) -> std::io::Result<Option<CanEvent>> {
+            Ok(self.0.take().map(|frame| CanEvent::Frame(frame, Duration::ZERO)))
+        }
+    }
+
+    #[test]
+    fn a_frame_of_29_bits_is_not_the_drives() {
+        for extended in [false, true] {
+            let mut session = session();
+            let foreign = Foreign(CanFrame::build(0x185, extended, &[0; 8]));
+            let mut master = master(&session, foreign);
+            master.read_state(&mut session).unwrap();
+            let status = session.endpoint.value(master.map.status);
+            assert_eq!(status.is_nan(), extended, "{status}");
+        }
+    }
+
+    /// Set-points that no frame can carry are a failure: nobody would know that an 'off' was never sent.
+    #[test]
+    fn set_points_that_no_frame_carries_are_not_taken_as_sent() {
+        let session = session();
+        let mut master = master(&session, Foreign(None));
+        assert_eq!(master.process_data(&session, 0, &[]), Ok(()));
+        master.map.out = 0x800;
+        assert!(master.process_data(&session, 0, &[]).is_err());
+    }
+
+    #[test]
+    fn a_node_beyond_127_is_refused() {
+        for base in [0, 128, 300] {
+            let refused = spawn(&InstrumentSetup { base: Some(base), ..stage() }, session());
+            assert!(matches!(refused, Err(Ended::Io(why)) if why.contains("1 to 127")), "{base}");
+        }
+    }
+
     /// Switching off waits for the drive's state: no longer than it may, however full the bus is.
     #[test]
     fn a_full_bus_does_not_hold_up_an_off() {
-        let setup = InstrumentSetup {
-            dead_weight_n: Some(0.25),
-            ..InstrumentSetup::new("cia402-profile-velocity", "none")
-        };
-        let (endpoint, _port) = Endpoint::stage(crate::profile(&setup.profile).unwrap(), &setup).unwrap();
-        let (ready, _opened) = std::sync::mpsc::sync_channel(1);
-        let mut session = Session::new(endpoint, Instant::now(), Arc::default(), ready);
-        let map = Map::of(&session, 5).unwrap();
-        let block = vec![0; map.length];
-        let port: Box<dyn CanPort> = Box::new(Flood);
-        let mut master = Master { port, node: 5, limit_ms: 20, map, block, tries: 0 };
+        let mut session = session();
+        let mut master = master(&session, Flood);
         let (done, ended) = std::sync::mpsc::channel();
         // A thread of its own: what hangs must fail, not hang the test.
         std::thread::spawn(move || {

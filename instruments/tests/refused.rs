@@ -9,6 +9,8 @@ const STAGE: &str = include_str!("../../drivers/profiles/muprime-stage.toml");
 const CAN: &str = include_str!("../../drivers/profiles/ati-netft-can.toml");
 const LINES: &str = include_str!("../../drivers/profiles/piezodrive-pdus210.toml");
 const SCPI: &str = include_str!("../../drivers/profiles/keysight-33500b.toml");
+const RELAY: &str = include_str!("../../drivers/profiles/muprime-relay.toml");
+const DRIVE: &str = include_str!("../../drivers/profiles/cia402-profile-velocity.toml");
 const DBC: &str = include_str!("../../drivers/profiles/muprime-can.dbc");
 
 fn read(text: &str, dbc: &str) -> Result<(), ProfileError> {
@@ -131,6 +133,10 @@ fn each_wrong_profile_is_refused_with_place_and_cause() {
             changed(RTU, "type = \"i16\"", "type = \"i16\"\nresolution_si = 0.0"),
             "resolution_si",
         ),
+        ("a noise below zero", changed(RTU, "type = \"i16\"", "type = \"i16\"\nnoise = -1.0"), "`noise`"),
+        ("a bit that is a float", changed(RELAY, "type = \"u16\"", "type = \"f32\""), "its type is `u16`"),
+        ("an identifier of 30 bits", extra(CAN, "[[init]]\ncan = [0x20000000, [1]]"), "29 bits"),
+        ("an identifier beyond CANopen's", changed(DRIVE, "cob = 0x180", "cob = 0x781"), "0x780"),
         ("an id with a path in it", changed(RTU, "id = \"robotiq-ft300\"", "id = \"../ft300\""), "not an id"),
         (
             "a file elsewhere",

@@ -100,8 +100,8 @@ pub struct Watch {
 }
 
 impl Watch {
-    /// Shows the run in a folder; `lead` are the signals of one that this process leads, whose folder need not
-    /// be there yet.
+    /// Shows the run in a folder; `lead` are the signals of one that this process leads, whose folder need
+    /// not be there yet.
     ///
     /// # Errors
     /// No terminal, or no thread can be had.

@@ -319,7 +319,9 @@ impl Compiler<'_> {
             }
         };
         if let Place::Bytes(field) = &place {
-            self.check_field(field, frames[frame].bytes, &s.name)?;
+            let bit =
+                matches!(frames[frame].kind, FrameKind::Poll(i) if self.description.poll[i].table.is_bits());
+            self.check_field(field, frames[frame].bytes, bit, &s.name)?;
         }
         let scales = [s.scale, s.si.factor];
         if scales.contains(&0.0) || !scales.iter().chain([&s.offset]).all(|x| x.is_finite()) {
@@ -340,6 +342,9 @@ impl Compiler<'_> {
         };
         if s.resolution_si.is_some_and(|step| !(step.is_finite() && step > 0.0)) {
             return Err(wrong(format!("`resolution_si` of signal `{name}` must be above zero")));
+        }
+        if s.noise.is_some_and(|sd| !(sd.is_finite() && sd >= 0.0)) {
+            return Err(wrong(format!("`noise` of signal `{name}` must not be below zero")));
         }
         let step = match (&place, &frames[frame].text) {
             (_, Some(Form::Pattern(pattern))) => {
@@ -458,7 +463,8 @@ impl Compiler<'_> {
             Field { at: 2 * usize::from(s.register), number, order: s.byte_order, bits: None }
         };
         let number = field.number;
-        self.check_field(&field, 2 * usize::from(blocks[block].count), &s.name)?;
+        let (bytes, bit) = (2 * usize::from(blocks[block].count), blocks[block].table.is_bits());
+        self.check_field(&field, bytes, bit, &s.name)?;
         if let Some((low, high)) = s.range {
             let (least, most) = (number.limits().0 * s.scale, number.limits().1 * s.scale);
             if low < least.min(most) || high > least.max(most) {
@@ -506,6 +512,7 @@ impl Compiler<'_> {
         &self,
         field: &Field,
         frame_bytes: usize,
+        bit: bool,
         named: &toml::Spanned<String>,
     ) -> Result<(), ProfileError> {
         let (name, end) = (named.as_ref(), field.end());
@@ -513,6 +520,9 @@ impl Compiler<'_> {
             return Err(
                 self.at_name(named, format!("`{name}` ends at byte {end} of a frame of {frame_bytes}"))
             );
+        }
+        if bit && field.number.bytes() > 2 {
+            return Err(self.at_name(named, format!("`{name}` is a bit of its table: its type is `u16`")));
         }
         if let Some((first, width)) = field.bits {
             // a number has at most 4 bytes

@@ -5,6 +5,7 @@ mod frames;
 
 use super::compile::Compiler;
 use super::{Frame, FrameKind};
+use crate::codec::can::CanFrame;
 use crate::codec::from_hex;
 use crate::error::ProfileError;
 use crate::schema::{Init, LinkKind, Role, Set, Table};
@@ -143,6 +144,13 @@ impl Compiler<'_> {
                 return Err(self.at_name(name, problem));
             }
         }
+        // An identifier of CANopen has 11 bits; a node's number, at most 127, is added to `cob`.
+        let mut cobs =
+            d.message.iter().map(|m| (&m.name, m.cob)).chain(d.write.iter().map(|w| (&w.name, w.cob)));
+        if let Some((name, Some(cob))) = cobs.find(|(_, cob)| cob.is_some_and(|cob| cob > 0x780)) {
+            let problem = format!("`{}`: `cob` = {cob:#x} is above 0x780, the largest", name.as_ref());
+            return Err(self.at_name(name, problem));
+        }
         for query in &d.query {
             let (name, send) = (query.name.as_ref(), &query.send);
             if d.link.kind == Sysfs && (send.is_empty() || send.starts_with('.') || send.contains(['/', ' ']))
@@ -217,6 +225,7 @@ impl Compiler<'_> {
             ("registers", init.registers.is_some(), &[ModbusTcp, ModbusRtu]),
             ("sdo", init.sdo.is_some(), &[Canopen]),
         ];
+        let no_frame = |(id, data): &(u32, Vec<u8>)| CanFrame::build(*id, *id > 0x7FF, data).is_none();
         let no_bytes = |hex: &str| from_hex(hex).is_none_or(|bytes| bytes.is_empty());
         let used: Vec<&(&str, bool, &[LinkKind])> = acts.iter().filter(|(_, used, _)| *used).collect();
         let kind = self.description.link.kind;
@@ -227,6 +236,9 @@ impl Compiler<'_> {
                 }
                 Some(_) if !matches!(init.table, Table::Holding | Table::Coil) => {
                     "only holding registers and coils can be written".into()
+                }
+                _ if init.can.as_ref().is_some_and(no_frame) => {
+                    "`can` has an identifier of 29 bits at most, and 8 bytes at most".into()
                 }
                 _ if init.hex.as_deref().is_some_and(no_bytes) => "`hex` is not bytes in hexadecimal".into(),
                 _ if init.expect.is_some() && (init.send.is_none() || kind == Udp) => {

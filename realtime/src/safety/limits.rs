@@ -348,6 +348,10 @@ impl Limits {
         let (left, right) = self.travel_m;
         range::TRAVEL_M.check("travel_min_m", left)?;
         range::TRAVEL_M.check("travel_max_m", right)?;
+        if right < left {
+            let needed = "more than travel_min_m (the two ends are swapped)";
+            return Err(LimitError::Unusable { name: "travel_max_m", value: right, needed });
+        }
         range::STROKE_M.check("travel_max_m", right - left)?;
         range::FROZEN.check("frozen_after", f64::from(self.frozen_after))?;
         if let Some(after) = self.amplitude_frozen_after {

@@ -6,7 +6,7 @@ use crate::run_dir::sha256_of;
 use drivers::endpoint::Endpoint;
 use drivers::library::{Library, Source};
 use drivers::ports::compose;
-use drivers::{InstrumentSetup, bundled};
+use drivers::{InstrumentSetup, SetupError, bundled};
 use instruments::schema::LinkKind;
 use instruments::traffic::LineSetup;
 use instruments::{Profile, SignalId};
@@ -162,6 +162,7 @@ pub(super) fn fit(file: &SetupFile) -> Vec<Problem> {
     }
     if problems.is_empty() {
         problems.extend(twice(&all));
+        problems.extend(one_signal(file));
         problems.extend(share_lines(&all).err());
     }
     problems
@@ -196,6 +197,24 @@ fn twice(all: &[(&'static str, &InstrumentSetup)]) -> Vec<Problem> {
         }
     }
     problems
+}
+
+/// A signal of one instrument that two tables of force name. Each `pty` is an instrument of its own, and so
+/// is each free port but that of Modbus TCP, whose units share one.
+fn one_signal(file: &SetupFile) -> Option<Problem> {
+    let own = |axis: &Axis<'_>| {
+        let (address, kind) = (&axis.instrument.address, axis.profile.description.link.kind);
+        address.ends_with("pty") || address.ends_with(":0") && kind != LinkKind::ModbusTcp
+    };
+    let axes: Vec<Axis<'_>> = file.axes().filter(|axis| !own(axis)).collect();
+    let place = |axis: &Axis<'_>| {
+        let (i, link) = (axis.instrument, &axis.profile.description.link);
+        let unit = i.unit.or(link.unit);
+        (i.address.clone(), i.profile.clone(), unit, i.base.or(link.base), axis.signal.0)
+    };
+    let again = (1..axes.len()).find(|&k| axes[..k].iter().any(|before| place(before) == place(&axes[k])));
+    let signal = again.map(|k| axes[k].described().name.as_ref().clone());
+    signal.map(|signal| (vec!["force"], SetupError::OneSignal(signal).to_string()))
 }
 
 /// Whether instruments at one serial line can share it: sensors with Modbus RTU can.
@@ -398,6 +417,16 @@ mod tests {
         let text = rtu(9600).unwrap_err();
         assert!(text.contains("capacity"), "{text}");
         rtu(115_200).unwrap();
+    }
+
+    #[test]
+    fn one_signal_is_not_an_axis_of_two_tables() {
+        let one = "[[force]]\nprofile = \"muprime-force2\"\naddress = \"127.0.0.1:0\"";
+        let axis = |axis: &str, signal: &str| format!("{one}\n{axis} = {{ signal = \"{signal}\" }}\n");
+        // Each of them gives its other axis by the name of its signal, which is the other's.
+        let text = changed(one, &format!("{}{}", axis("lateral", "lateral"), axis("normal", "normal")));
+        let text = text.unwrap_err();
+        assert!(text.contains("cannot be both axes"), "{text}");
     }
 
     #[test]

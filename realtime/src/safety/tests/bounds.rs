@@ -368,6 +368,11 @@ fn a_refused_limit_is_named() {
     assert_eq!(refused(|l| l.late_in_a_row_max = 0), "late_in_a_row_max");
     assert_eq!(refused(|l| l.travel_m.1 = f64::NAN), "travel_max_m");
     assert_eq!(refused(|l| l.timing.cycle = Nanos(0)), "cycle");
+    let mut limits = Limits::paper(T);
+    limits.travel_m = (0.06, -0.06);
+    let reversed = limits.checked().unwrap_err();
+    assert_eq!(reversed.name(), "travel_max_m");
+    assert!(reversed.to_string().contains("swapped"), "{reversed}");
     let timing = ChannelTiming { period: Nanos(7), latency: Nanos(0), periods: 2 };
     assert_eq!(timing.age_limit(), Nanos(14));
 }
