@@ -19,7 +19,7 @@ const LEAST_DRAWS: usize = 20;
 /// Squared errors of a pass: under four models, of repeatability, and the part of it that passes have in common.
 const ERRORS: usize = 6;
 /// Error of the recalibrated baseline, as a multiple of the nominal one's, above which a remark says so.
-const MISLED: f64 = 1.05;
+const MISLED: f64 = 1.1;
 /// Quantiles of a 95 % interval.
 const CI95: [f64; 2] = [0.025, 0.975];
 

@@ -183,7 +183,7 @@ function cycleFigures(root, { passes, traces: cycles, events, limits }, finer) {
     loop.show(points.length > 0);
     now = () => time.map((t, i) => ({ time_s: t, position_mm: position[i], lateral_low_n: lateral[1][i], lateral_high_n: lateral[0][i], normal_low_n: normal[1][i], normal_high_n: normal[0][i], mu_relative_low: mu[1][i], mu_relative_high: mu[0][i] })).filter((row) => row.lateral_low_n != null || row.normal_low_n != null);
     const pass = passes.find((p) => String(p.point) === String(point));
-    const what = pass ? words(pass) : `all ${cycles.length} passes`;
+    const what = pass ? words(pass) : `All ${cycles.length} passes`;
     const happened = inside.map(([at, event]) => `${at.toFixed(1)} s ${event.split("\n")[0]}`).join("; ");
     const bounds = limits ? ` Limits: ${limits.lateral_n} N lateral, ${limits.normal_n} N normal${point === "" ? "" : ", where they are within the axis"}.` : "";
     const each = stretch === 1 ? "every recorded cycle" : stretch ? `bands from the least to the greatest of ${stretch} cycles` : "bands from the least to the greatest cycle, a hundred stretches a pass";

@@ -199,7 +199,7 @@ fn figure(
         for default in [" opacity=\"1\"", " stroke=\"none\"", " stroke-width=\"1\""] {
             svg = svg.replace(default, "");
         }
-        let svg = dots_joined(&svg).replacen(
+        let svg = marks_joined(&svg).replacen(
             "<svg ",
             &format!("<svg role=\"img\" aria-label=\"{}\" ", escape(alt)),
             1,
@@ -269,33 +269,32 @@ impl<C, DB: DrawingBackend> Drawable<DB> for Mark<C> {
     }
 }
 
-/// Dots of one look that follow one another become one path: a point of a line with round ends is a dot. Equal
-/// ones cover each other and are drawn once. Else a table of 10,000 passes makes a page of 27 MB.
-fn dots_joined(svg: &str) -> String {
-    let dot = |line: &str| {
+/// Dots and strokes of one look that follow one another become one path: a point of a line with round ends is
+/// a dot. Equal ones cover each other and are drawn once. Else 10,000 passes make a page of 27 MB.
+fn marks_joined(svg: &str) -> String {
+    let mark = |line: &str| {
         let parts: Vec<&str> = line.split('"').collect();
         match parts[..] {
             ["<circle cx=", x, " cy=", y, " r=", radius, " fill=", colour, " stroke-width=", "2", "/>"] => {
-                let look =
-                    format!("stroke=\"{colour}\" stroke-width=\"{}\"", 2 * radius.parse::<u32>().ok()?);
+                let width = 2 * radius.parse::<u32>().ok()?;
+                let look = format!("stroke=\"{colour}\" stroke-width=\"{width}\" stroke-linecap=\"round\"");
                 Some((look, format!("M{x},{y}h0")))
+            }
+            ["<polyline fill=", "none", " stroke=", colour, " points=", points, "/>"] => {
+                Some((format!("fill=\"none\" stroke=\"{colour}\""), format!("M{}", points.trim_end())))
             }
             _ => None,
         }
     };
     let mut text = String::new();
-    let lines: Vec<_> = svg.lines().map(|line| (line, dot(line))).collect();
-    for alike in
-        lines.chunk_by(|(_, a), (_, b)| a.is_some() && a.as_ref().map(|a| &a.0) == b.as_ref().map(|b| &b.0))
-    {
-        let places: BTreeSet<&str> =
-            alike.iter().flat_map(|(_, dot)| dot).map(|(_, place)| &place[..]).collect();
-        let _ = match &alike[0] {
-            (line, None) => writeln!(text, "{line}"),
-            (_, Some((look, _))) => {
-                let path = Vec::from_iter(places).concat();
-                writeln!(text, "<path {look} stroke-linecap=\"round\" d=\"{path}\"/>")
-            }
+    let lines: Vec<_> = svg.lines().map(|line| (line, mark(line))).collect();
+    let look = |line: &(&str, Option<(String, String)>)| line.1.as_ref().map(|mark| mark.0.clone());
+    for alike in lines.chunk_by(|a, b| look(a).is_some() && look(a) == look(b)) {
+        let paths: BTreeSet<&str> =
+            alike.iter().flat_map(|(_, mark)| mark).map(|(_, path)| &path[..]).collect();
+        let _ = match look(&alike[0]) {
+            None => writeln!(text, "{}", alike[0].0),
+            Some(look) => writeln!(text, "<path {look} d=\"{}\"/>", Vec::from_iter(paths).concat()),
         };
     }
     text
@@ -439,7 +438,7 @@ mod tests {
     }
 
     #[test]
-    fn dots_of_one_look_are_one_path_and_the_others_stay() {
+    fn marks_of_one_look_are_one_path_and_the_others_stay() {
         let dot = |x: u32, colour: &str| {
             format!("<circle cx=\"{x}\" cy=\"7\" r=\"2\" fill=\"#{colour}\" stroke-width=\"2\"/>\n")
         };
@@ -447,10 +446,14 @@ mod tests {
             "<circle cx=\"1\" cy=\"7\" r=\"2\" fill=\"none\" stroke=\"#111111\" stroke-width=\"2\"/>\n";
         let svg =
             [dot(3, "0072B2"), dot(1, "0072B2"), dot(3, "0072B2"), dot(3, "D55E00"), ring.into()].concat();
+        let bar = "<polyline fill=\"none\" stroke=\"#000000\" points=\"3,4 3,9 \"/>\n";
+        let svg = [svg, bar.into(), bar.replace("3,9", "3,8")].concat();
         let path = |colour: &str, d: &str| {
             format!("<path stroke=\"#{colour}\" stroke-width=\"4\" stroke-linecap=\"round\" d=\"{d}\"/>\n")
         };
-        let wanted = [path("0072B2", "M1,7h0M3,7h0"), path("D55E00", "M3,7h0"), ring.into()].concat();
-        assert_eq!(dots_joined(&svg), wanted);
+        let bars = "<path fill=\"none\" stroke=\"#000000\" d=\"M3,4 3,8M3,4 3,9\"/>\n";
+        let wanted =
+            [path("0072B2", "M1,7h0M3,7h0"), path("D55E00", "M3,7h0"), ring.into(), bars.into()].concat();
+        assert_eq!(marks_joined(&svg), wanted);
     }
 }
