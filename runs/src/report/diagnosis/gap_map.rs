@@ -9,6 +9,8 @@ use models::covariate::{self, Covariate};
 
 /// Cells along an axis at most.
 const CELLS: usize = 6;
+/// Marks in a cell at most: of more passes each mark is the mean of some that follow one another.
+const MARKS: usize = 60;
 /// Share of a setting's range within which values are one level.
 const LEVEL: f64 = 0.04;
 /// Shades on either side of zero.
@@ -35,8 +37,8 @@ pub fn section(points: &Table, errors: &[(f64, f64)]) -> String {
     let pairs: String = maps.iter().map(pair).collect();
     let text = note(
         "Number: mean of measured less predicted relative friction in the part, positive (warm) where more friction was measured than the \
-         model says, negative (cool) where less. Marks: its passes in the order of measurement, each in the colour of its own gap; click \
-         one for its numbers. A part without passes says nothing.",
+         model says, negative (cool) where less. Marks: its passes in the order of measurement, each in the colour of its own gap (of more than 60 passes \
+         the mean of some in a row); click one for its numbers. A part without passes says nothing.",
     );
     format!("{}{pairs}{text}", scale(end))
 }
@@ -168,15 +170,18 @@ impl<'a> Map<'a> {
             return "<td class=\"none\">&ndash;</td>".into();
         }
         let mean = self.mean(cell, after);
-        let mark = |&i: &usize| {
-            let (error, point) = (self.error(i, after), self.points.points[i]);
+        let mark = |passes: &[usize]| {
+            let error = self.mean(passes, after);
+            let point = self.points.points[passes[0]];
+            let more =
+                if passes.len() == 1 { String::new() } else { format!(" and {} more", passes.len() - 1) };
             let (shade, error) = (shade(error, end), signed(error));
             // Out of the keyboard's way: the table of all passes has the same numbers.
             format!(
-                "<a class=\"{shade}\" href=\"#pass-{point}\" tabindex=\"-1\" title=\"pass {point}: {error}\"></a>"
+                "<a class=\"{shade}\" href=\"#pass-{point}\" tabindex=\"-1\" title=\"pass {point}{more}: {error}\"></a>"
             )
         };
-        let marks: String = cell.iter().map(mark).collect();
+        let marks: String = cell.chunks(cell.len().div_ceil(MARKS)).map(mark).collect();
         format!("<td class=\"{}\">{}<div>{marks}</div></td>", shade(mean, end), signed(mean))
     }
 }
