@@ -263,12 +263,15 @@ impl Setup {
             let most = realtime::estimate::WINDOW_MAX;
             wrong.add(&["estimate", "window"], format!("a window has 1 to {most} samples"), None);
         }
-        for (name, value) in
-            [("pass_relative_sd", file.noise.pass_relative_sd), ("force_sd_n", file.noise.force_sd_n)]
-        {
+        for (table, name, value) in [
+            ("noise", "pass_relative_sd", file.noise.pass_relative_sd),
+            ("noise", "force_sd_n", file.noise.force_sd_n),
+            ("estimate", "normal_force_min_n", file.estimate.normal_force_min_n),
+            ("estimate", "sample_sd_n", file.estimate.sample_sd_n),
+        ] {
             if !(value.is_finite() && value > 0.0) {
                 let problem = format!("{name} = {value}: a finite number above zero is needed");
-                wrong.add(&["noise", name], problem, None);
+                wrong.add(&[table, name], problem, None);
             }
         }
         // A world that cannot be is refused here, not by the run that would need it.
