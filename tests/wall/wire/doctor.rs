@@ -125,8 +125,8 @@ fn the_doctor_tells_a_healthy_sensor_by_its_figures() {
     });
 }
 
-/// The virtual rigs are served and looked at like any other, against the plan that is to run on them. A stall of
-/// the computer is a finding of its own; the guest, a slow one, misses every second sample of four instruments.
+/// The virtual rigs are served and looked at like any other, against the plan that is to run on them. A stall
+/// of the computer is a finding of its own; the guest, a slow one, misses every second sample of five links.
 #[test]
 fn the_doctor_approves_the_bundled_rigs() {
     wall::again_beside_a_stall(|| {
