@@ -126,7 +126,7 @@ fn the_doctor_tells_a_healthy_sensor_by_its_figures() {
 }
 
 /// The virtual rigs are served and looked at like any other, against the plan that is to run on them. A stall
-/// of the computer is a finding of its own; the guest, a slow one, misses every second sample of five links.
+/// of the computer is a finding of its own, and the guest is too slow for a relay's rig: it misses samples.
 #[test]
 fn the_doctor_approves_the_bundled_rigs() {
     wall::again_beside_a_stall(|| {
