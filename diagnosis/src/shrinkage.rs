@@ -61,14 +61,15 @@ impl Gap {
         self.shrinkage.filter(|_| times > MISLED)?;
         let above = |rmse: f64| Some((rmse.powi(2) - self.noise_floor_rmse?.powi(2)).max(0.0).sqrt());
         let share = 1.0 - above(self.after_rmse?)? / above(self.before_rmse?)?;
+        let verb = if share < 0.0 { "grows" } else { "shrinks" };
         let nominal = if share.is_finite() {
-            format!("Counted from the nominal model, it shrinks by {:.0} %.", 100.0 * share)
+            format!("Counted from the nominal model, the gap {verb} by {:.0} %.", 100.0 * share.abs())
         } else {
             "The nominal model has no gap there.".to_string()
         };
         Some(format!(
-            "On passes that were held out, the recalibrated model is {times:.2} times as far off as the nominal one: \
-             its stiffnesses took up part of the gap. {nominal}"
+            "On passes that were held out, the recalibrated model, from which the shrinkage counts, is {times:.2} \
+             times as far off as the nominal one. {nominal}"
         ))
     }
 }
@@ -238,6 +239,8 @@ mod tests {
         let remark = gap(0.066).remark().unwrap();
         // 1 - sqrt((0.02^2 - 0.01^2) / (0.05^2 - 0.01^2))
         assert!(remark.contains("1.32 times") && remark.contains("shrinks by 65 %"), "{remark}");
+        let worse = Gap { after_rmse: Some(0.06), ..gap(0.066) }.remark().unwrap();
+        assert!(worse.contains("the gap grows by 21 %"), "{worse}");
         assert_eq!(gap(0.049).remark(), None);
         assert_eq!(Gap { shrinkage: None, ..gap(0.066) }.remark(), None);
     }

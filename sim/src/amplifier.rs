@@ -113,7 +113,7 @@ pub struct Amplifier {
     watchdog_tripped: bool,
     fault: bool,
     /// The supply relay is closed, by its mirror contact; the output then stays off until it is commanded on
-    /// anew.
+    /// again.
     pub supply_closed: bool,
     temperature_c: f64,
     /// Drive that its amplitude control has reached (m), and when.

@@ -75,11 +75,12 @@ fn agree(path: &Path, table: &[Pass], journal: &[MeasuredPass]) -> miette::Resul
 
 /// The points whose line in the table is not what the journal holds, in a sentence each.
 pub(super) fn changed(table: &[Pass], journal: &[MeasuredPass]) -> impl Iterator<Item = String> {
-    let differ = |p: &&MeasuredPass| table.iter().any(|k| k.point == p.pass.point && *k != p.pass);
-    let words = |p: &MeasuredPass| {
-        format!("point {}: {POINTS} and {JOURNAL} differ: one of them was changed", p.pass.point)
-    };
-    journal.iter().filter(differ).map(words)
+    let held: BTreeMap<u64, &Pass> = journal.iter().map(|p| (p.pass.point, &p.pass)).collect();
+    let differ = move |row: &&Pass| held.get(&row.point).is_some_and(|pass| *pass != *row);
+    table
+        .iter()
+        .filter(differ)
+        .map(|row| format!("point {}: {POINTS} and {JOURNAL} differ: one of them was changed", row.point))
 }
 
 /// Puts the passes into the table that the journal alone holds: after a crash between the two the last one,
@@ -96,8 +97,8 @@ pub(super) fn restore(
     if let Some(what) = changed(made, &passes).next() {
         miette::bail!(
             help = format!(
-                "take {POINTS} and {JOURNAL} from a copy of the folder; or, if {JOURNAL} is right, remove {POINTS}: the \
-                 same command writes it again"
+                "take {POINTS} and {JOURNAL} from a copy of the folder; or, if {JOURNAL} is right, remove {POINTS}: \
+                 the same command writes it again"
             ),
             "{}: {what}",
             path.display()

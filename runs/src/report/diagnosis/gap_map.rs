@@ -35,11 +35,12 @@ pub fn section(points: &Table, errors: &[(f64, f64)]) -> String {
     let pair =
         |map: &Map<'_>| format!("<div class=\"maps\">{}{}</div>", map.html(false, end), map.html(true, end));
     let pairs: String = maps.iter().map(pair).collect();
-    let text = note(
-        "Number: mean of measured less predicted relative friction in the part, positive (warm) where more friction was measured than the \
-         model says, negative (cool) where less. Marks: its passes in the order of measurement, each in the colour of its own gap (of more than 60 passes \
-         the mean of some in a row); click one for its numbers. A part without passes says nothing.",
-    );
+    let text = note(&format!(
+        "Number: mean of measured less predicted relative friction in the part, positive (warm) where more \
+         friction was measured than the model says, negative (cool) where less. Marks: its passes in the order \
+         of measurement, each in the colour of its own gap (of more than {MARKS} passes the mean of some in a \
+         row); click one for its numbers. A part without passes says nothing."
+    ));
     format!("{}{pairs}{text}", scale(end))
 }
 
