@@ -133,6 +133,7 @@ const WRONG: &[Wrong] = &[
     ("setup.toml", "profile = \"muprime-stage\"", "profile = \"muprime-force2\"", "muprime-force2"),
     ("setup.toml", "rate_hz = 1000", "rate_hz = 1", "kHz meant?"),
     ("setup.toml", "priority = 80", "priority = 120", "priority"),
+    ("setup.toml", "priority = 80", "priority = 80\ncpu = 99999999", "counted from 0 to 1023"),
     ("setup.toml", "window = 50", "window = 0", "window"),
     ("setup.toml", "normal_force_min_n = 0.02", "normal_force_min_n = -0.02", "normal_force_min_n"),
     ("setup.toml", "sample_sd_n = 0.002", "sample_sd_n = 0", "sample_sd_n"),

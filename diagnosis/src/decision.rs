@@ -14,6 +14,7 @@
 //! changed here.
 
 use crate::bases::Bends;
+use crate::constants::Constants;
 use crate::departure::Freedom;
 use crate::evidence::{Posterior, laplace};
 use crate::fitted::{Candidate, Fitted};
@@ -108,6 +109,7 @@ pub fn decide(fitted: &mut Fitted) -> Decision {
     }
     let mut class = alias_class(fitted, leader);
     let departed = departed_singles(fitted, leader);
+    let joined = joined(fitted, leader);
     let renamed = renamed(fitted, leader, &class);
     let alone = k.alone_share[usize::from(candidates[leader].effects.len() > 1)];
     // Priors alone make no name: a rival whose forces are the same must differ in the data.
@@ -116,6 +118,7 @@ pub fn decide(fitted: &mut Fitted) -> Decision {
         && departed.is_empty()
         && renamed.is_empty();
     class.extend(departed);
+    class.extend(joined);
     let of = |class: &[usize], p: &[f64]| class.iter().map(|&i| p[i]).sum::<f64>();
     // Half of the gap at least, whatever the evidence says.
     let closes = judged.pooled >= k.region_closed;
@@ -240,6 +243,22 @@ fn departed_singles(fitted: &Fitted, leader: usize) -> Vec<usize> {
         .collect()
 }
 
+/// Pairs of a leading single cause and a second one that gains too much for a companion by chance, as far as
+/// the table does not tell which.
+fn joined(fitted: &Fitted, leader: usize) -> Vec<usize> {
+    let (k, own) = (&fitted.problem.constants, &fitted.candidates[leader]);
+    let with_it =
+        |c: &Candidate| own.effects.len() == 1 && c.effects.len() > 1 && c.effects.contains(&own.effects[0]);
+    let pairs: Vec<(usize, f64)> = (0..)
+        .zip(&fitted.candidates)
+        .filter(|(_, c)| with_it(c))
+        .map(|(i, c)| (i, c.log_evidence - own.log_evidence))
+        .collect();
+    let most = pairs.iter().map(|(_, gain)| *gain).fold(f64::NEG_INFINITY, f64::max);
+    let least = k.pair_folded_nats[1].max(most - k.alias_nats);
+    pairs.into_iter().filter(|(_, gain)| *gain > least).map(|(i, _)| i).collect()
+}
+
 /// Of a leader whose size is a function of the place: the causes that go with the place by their mechanism,
 /// where the evidence for the function is small.
 fn placed_singles(fitted: &Fitted, own: &Candidate) -> Vec<usize> {
@@ -298,8 +317,9 @@ fn same_forces(fitted: &Fitted, leader: usize, rival: usize) -> bool {
     b.u.len() <= a.u.len() && apart < fitted.problem.constants.same_forces_chi2
 }
 
-/// A pair that says little more than one of its members alone is that single with a form of its own: its
-/// weight goes to such members, and to singles that do better than they, in proportion to their evidence.
+/// A pair that says little more than one of its members alone may be that single with a form of its own: a
+/// share of its weight, the less the more it gains, goes to such members, and to singles that do better than
+/// they, in proportion to their evidence.
 fn fold_pairs(fitted: &Fitted, probabilities: &mut [f64]) {
     let k = &fitted.problem.constants;
     let candidates = &fitted.candidates;
@@ -328,12 +348,19 @@ fn fold_pairs(fitted: &Fitted, probabilities: &mut [f64]) {
         }));
         let evidence: Vec<f64> = heirs.iter().map(|&i| candidates[i].log_evidence / k.temper).collect();
         let total = crate::gaussian::log_sum_exp(&evidence);
-        let weight = probabilities[pair] * k.pair_folded;
+        let weight = probabilities[pair] * folded(k, own.log_evidence - best);
         probabilities[pair] -= weight;
         for (i, e) in heirs.iter().zip(&evidence) {
             probabilities[*i] += weight * (e - total).exp();
         }
     }
+}
+
+/// The share of its weight that a pair gives to its members, of which it raises the log evidence by this gain.
+fn folded(k: &Constants, gain: f64) -> f64 {
+    let [from, to] = k.pair_folded_nats;
+    let [small, large] = k.pair_folded;
+    small + (large - small) * ((gain - from) / (to - from)).clamp(0.0, 1.0)
 }
 
 /// The members of a pair that alone say nearly as much as it does, of a gap of this chi2.
@@ -408,6 +435,23 @@ mod tests {
         assert!(least > 1e-30, "{least:e}");
         let sum: f64 = report.hypotheses.iter().map(|h| h.probability).sum();
         assert!((sum - 1.0).abs() < 1e-9, "{sum}");
+    }
+
+    /// A second cause that gains more than chance does, but not enough for a name, keeps the first from being
+    /// named alone: another form of the first would do the same.
+    #[test]
+    fn a_small_second_cause_is_in_the_class() {
+        let mut table = table(&mut Deviates(5), 0.6);
+        for (lateral, pass) in table.lateral.iter_mut().zip(&table.passes) {
+            *lateral *= 1.0 - 0.07 * (pass.amplitude.metres() / 3e-6);
+        }
+        let report = diagnose(&table, &rig(), &Options::default(), String::new()).report;
+        assert_eq!(report.verdict, Verdict::Ambiguous, "{}", report.text);
+        assert!(report.text.contains("cannot separate rate dependent friction, "), "{}", report.text);
+        assert_eq!(report.at_least, ["rate_dependent_friction"]);
+        let first = &report.hypotheses[0];
+        assert_eq!(first.effects, ["rate_dependent_friction"], "{}", report.text);
+        assert!(first.alias_class[1..].iter().all(|name| name.contains('+')), "{:?}", first.alias_class);
     }
 
     /// Values at the ends of what a table may hold give an answer too.

@@ -20,7 +20,7 @@ pub struct Candidate {
     pub effects: Vec<usize>,
     /// Log evidence averaged over laws and shares.
     pub log_evidence: f64,
-    /// The best law and share.
+    /// Its law and share: those with the most evidence; of the leader those that predict left-out regions best.
     pub best: Posterior,
     /// Each law's own log evidence and solution.
     pub laws: Vec<(f64, Posterior)>,
@@ -54,9 +54,13 @@ impl Candidate {
             sum(&self.laws) - before
         };
         self.log_evidence += gained;
-        if let Some(best) = self.laws.iter().max_by(|a, b| a.0.total_cmp(&b.0)) {
-            self.best = best.1.clone();
-        }
+        self.best = self.likeliest().clone();
+    }
+
+    /// The law with the most evidence, which predicts. `best` may be another one, within `alias_nats` of it.
+    pub(crate) fn likeliest(&self) -> &Posterior {
+        let most = self.laws.iter().max_by(|a, b| a.0.total_cmp(&b.0));
+        most.map_or(&self.best, |(_, law)| law)
     }
 
     /// Names in the library's order.

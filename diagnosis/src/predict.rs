@@ -156,7 +156,7 @@ pub fn model(fitted: &Fitted, table: &Table, answer: &Answer, rows: Option<&[usi
     let part = |which: Which| match which {
         Which::Baseline => Part::Baseline,
         Which::Cause(i) => {
-            let best = Box::new(refit(&fitted.candidates[i].best));
+            let best = Box::new(refit(fitted.candidates[i].likeliest()));
             let shift = Recalibration::of(&problem, &best.u, &best.prediction).shift;
             let departure = departure_covariance(fitted, &problem, &best);
             Part::Effects { best, shift, departure }
@@ -173,7 +173,7 @@ pub fn model(fitted: &Fitted, table: &Table, answer: &Answer, rows: Option<&[usi
         let own = &fitted.candidates[leader].best;
         let at = answer.parts.iter().position(|(_, which)| *which == Which::Cause(leader));
         match at.filter(|_| own.plain.is_none()).map(|at| &parts[at].1) {
-            Some(Part::Effects { best, .. }) => (**best).clone(),
+            Some(Part::Effects { best, .. }) if best.members == own.members => (**best).clone(),
             _ => refit(own.by_law()),
         }
     });

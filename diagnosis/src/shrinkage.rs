@@ -40,7 +40,7 @@ pub struct Gap {
     pub noise_floor_rmse: Option<f64>,
     /// Share of the removable gap that is closed; none where there is no gap to shrink.
     pub shrinkage: Option<f64>,
-    /// Its interval over groups of passes (bootstrap, 95 per cent), widened for the scatter of the refits.
+    /// Its interval on as many other passes (bootstrap over groups, 95 per cent).
     pub shrinkage_ci95: Option<[f64; 2]>,
     /// Share of the removable gap's square that is left.
     pub unexplained_share: Option<f64>,
@@ -171,7 +171,7 @@ pub fn gap(fitted: &Fitted, table: &Table, rig: &RigFile, answer: &Answer) -> Ga
         .collect();
     draws.sort_by(f64::total_cmp);
     let estimate = shrink(&all).unwrap_or(0.0);
-    let wider = refits(folds);
+    let wider = widening(folds, list.len());
     let quantile = |q: f64| {
         let drawn = draws[((draws.len() - 1) as f64 * q).round() as usize];
         (estimate + wider * (drawn - estimate)).min(1.0)
@@ -191,11 +191,14 @@ pub fn gap(fitted: &Fitted, table: &Table, rig: &RigFile, answer: &Answer) -> Ga
     }
 }
 
-/// Factor on the deviation of a mean over folds for the refits: folds share most of what they were fitted to, so their errors go
-/// together by about the share that is held out, and resampling the errors does not show it (Nadeau & Bengio 2003).
-fn refits(folds: usize) -> f64 {
-    let k = folds as f64;
-    ((1.0 / k + 1.0 / (k - 1.0)) * k).sqrt()
+/// Factor on the deviation of the bootstrap's means, for an interval of the share on as many other passes.
+/// Refits to folds share most of their passes, so their errors go together by about the share that is held
+/// out (Nadeau & Bengio 2003); other passes scatter as much as these; and groups that are drawn anew scatter
+/// about their own mean, by less than about the true one.
+fn widening(folds: usize, groups: usize) -> f64 {
+    let [k, g] = [folds, groups].map(|n| n as f64);
+    let refitted = (1.0 / k + 1.0 / (k - 1.0)) * k;
+    ((refitted + 1.0) * g / (g - 1.0).max(1.0)).sqrt()
 }
 
 #[cfg(test)]

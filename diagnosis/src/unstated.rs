@@ -42,12 +42,13 @@ fn needed(fitted: &Fitted, which: Which) -> Vec<(&'static Covariate, String)> {
         }
         Which::Cause(i) => {
             let cause = &fitted.candidates[i];
-            let laws = cause.best.members.iter().flat_map(|m| {
+            let best = cause.likeliest();
+            let laws = best.members.iter().flat_map(|m| {
                 let needs = effects::at(m.effect).needs.iter().chain(m.form().needs);
                 let law = format!("{} by its law '{}'", m.name(), m.form().name);
                 needs.filter_map(|n| n.covariate()).map(move |c| (c, law.clone()))
             });
-            let sized = cause.best.change.bends_over(&TEMPERATURE);
+            let sized = best.change.bends_over(&TEMPERATURE);
             let sizes = sized.then(|| fitted.kernels.climate()).into_iter().flatten();
             let sizes = sizes.map(|c| (c, format!("the size of {}", cause.names().join(" + "))));
             laws.chain(sizes).collect()

@@ -198,6 +198,15 @@ impl Profile {
         &self.frames
     }
 
+    /// The largest identifier of CAN at this base.
+    pub fn last_identifier(&self, base: u32) -> u64 {
+        let parts = |frame: &Frame| match &frame.kind {
+            FrameKind::Messages(_, parts) => parts.iter().map(|part| part.id).max(),
+            _ => None,
+        };
+        u64::from(base) + u64::from(self.frames.iter().filter_map(parts).max().unwrap_or(0))
+    }
+
     /// The polls, each with its frame.
     pub fn polls(&self) -> impl Iterator<Item = (FrameId, &Poll)> {
         self.frames.iter().enumerate().filter_map(|(i, frame)| match frame.kind {

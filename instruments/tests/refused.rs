@@ -136,6 +136,7 @@ fn each_wrong_profile_is_refused_with_place_and_cause() {
         ("a noise below zero", changed(RTU, "type = \"i16\"", "type = \"i16\"\nnoise = -1.0"), "`noise`"),
         ("a bit that is a float", changed(RELAY, "type = \"u16\"", "type = \"f32\""), "its type is `u16`"),
         ("an identifier of 30 bits", extra(CAN, "[[init]]\ncan = [0x20000000, [1]]"), "29 bits"),
+        ("a request of nine bytes", changed(CAN, "[0x02]", "[2, 0, 0, 0, 0, 0, 0, 0, 0]"), "8 bytes"),
         ("an identifier beyond CANopen's", changed(DRIVE, "cob = 0x180", "cob = 0x781"), "0x780"),
         ("an id with a path in it", changed(RTU, "id = \"robotiq-ft300\"", "id = \"../ft300\""), "not an id"),
         (

@@ -43,6 +43,9 @@ pub const BUNDLED: &[(&str, &str)] = &[
 pub const THERMOMETER: &str =
     "state `temperature_fitted = false` in [limits] where nobody touches the plate, or take one that is read";
 
+/// CPUs that a set of Linux may name (`CPU_SETSIZE`).
+const MOST_CPUS: usize = 1024;
+
 /// A setup file.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize, schemars::JsonSchema)]
 #[serde(deny_unknown_fields)]
@@ -258,6 +261,13 @@ impl Setup {
         if loops && !(0.0..=half_period_us).contains(&file.pace.spin_us) {
             let problem = format!("spin_us = {}: 0 to {half_period_us} (half a period)", file.pace.spin_us);
             wrong.add(&["loop", "spin_us"], problem, None);
+        }
+        if let Some(cpu) = file.pace.cpu.filter(|cpu| *cpu >= MOST_CPUS) {
+            wrong.add(
+                &["loop", "cpu"],
+                format!("cpu = {cpu}: they are counted from 0 to {}", MOST_CPUS - 1),
+                None,
+            );
         }
         if !(1..=realtime::estimate::WINDOW_MAX).contains(&file.estimate.window) {
             let most = realtime::estimate::WINDOW_MAX;

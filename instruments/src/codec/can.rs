@@ -12,6 +12,9 @@ pub struct CanFrame {
     length: u8,
 }
 
+/// Largest identifier of 29 bits.
+pub const MOST_EXTENDED: u32 = 0x1FFF_FFFF;
+
 impl CanFrame {
     /// A frame with a standard identifier; `None` where the identifier has more than 11 bits or there
     /// are more than 8 bytes.
@@ -21,7 +24,7 @@ impl CanFrame {
 
     /// A frame of either kind; `None` where it cannot be.
     pub fn build(id: u32, extended: bool, data: &[u8]) -> Option<Self> {
-        let most = if extended { 0x1FFF_FFFF } else { 0x7FF };
+        let most = if extended { MOST_EXTENDED } else { 0x7FF };
         if id > most || data.len() > 8 {
             return None;
         }

@@ -8,7 +8,7 @@ use super::{Frame, FrameKind};
 use crate::codec::can::CanFrame;
 use crate::codec::from_hex;
 use crate::error::ProfileError;
-use crate::schema::{Init, LinkKind, Role, Set, Table};
+use crate::schema::{Init, LinkKind, Message, Role, Set, Table};
 
 /// What a role needs: signals, and set-points.
 const NEEDS: &[(Role, &[&str], &[&str])] = &[
@@ -143,6 +143,11 @@ impl Compiler<'_> {
                 let problem = format!("`{}`: a `rate_hz` is above 0 and at most {FASTEST_HZ}", name.as_ref());
                 return Err(self.at_name(name, problem));
             }
+        }
+        let long = |m: &&Message| m.request.as_ref().is_some_and(|data| data.len() > 8);
+        if let Some(message) = d.message.iter().find(long) {
+            let problem = format!("`{}`: a `request` has 8 bytes at most", message.name.as_ref());
+            return Err(self.at_name(&message.name, problem));
         }
         // An identifier of CANopen has 11 bits; a node's number, at most 127, is added to `cob`.
         let mut cobs =

@@ -7,6 +7,7 @@ use drivers::endpoint::Endpoint;
 use drivers::library::{Library, Source};
 use drivers::ports::compose;
 use drivers::{InstrumentSetup, SetupError, bundled};
+use instruments::codec::can::MOST_EXTENDED;
 use instruments::schema::LinkKind;
 use instruments::traffic::LineSetup;
 use instruments::{Profile, SignalId};
@@ -307,6 +308,15 @@ fn one_fits(table: &str, instrument: &InstrumentSetup) -> Result<(), (&'static s
     if let Some(key) = meaningless(table, instrument, &profile) {
         return Err((key, format!("`{key}` means nothing for this instrument: leave it out")));
     }
+    let link = &profile.description.link;
+    let base = instrument.base.or(link.base).unwrap_or(0);
+    let last = profile.last_identifier(base);
+    if link.kind == LinkKind::Can && last > u64::from(MOST_EXTENDED) {
+        return Err((
+            "base",
+            format!("from a base of {base:#x} on identifiers go up to {last:#x}, beyond 29 bits"),
+        ));
+    }
     match table {
         "force" => Endpoint::force(profile, instrument).map(drop),
         "amplifier" => Endpoint::amplifier(profile, instrument).map(drop),
@@ -417,6 +427,18 @@ mod tests {
         let text = rtu(9600).unwrap_err();
         assert!(text.contains("capacity"), "{text}");
         rtu(115_200).unwrap();
+    }
+
+    #[test]
+    fn a_base_whose_identifiers_have_more_than_29_bits_is_refused() {
+        let at = |base: u32| {
+            let text = Setup::load("virtual-slcan").unwrap().text;
+            let text = text.replacen("slcan:pty\"", &format!("slcan:pty\"\nbase = {base}"), 1);
+            Setup::parse("changed", &text, Path::new(".")).map_err(|e| format!("{e:?}"))
+        };
+        at(0x1FFF_FF00).unwrap();
+        let text = at(0x1FFF_FFFF).unwrap_err();
+        assert!(text.contains("beyond 29 bits"), "{text}");
     }
 
     #[test]
