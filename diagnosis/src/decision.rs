@@ -14,7 +14,6 @@
 //! changed here.
 
 use crate::bases::Bends;
-use crate::constants::Constants;
 use crate::departure::Freedom;
 use crate::evidence::{Posterior, laplace};
 use crate::fitted::{Candidate, Fitted};
@@ -255,7 +254,7 @@ fn joined(fitted: &Fitted, leader: usize) -> Vec<usize> {
         .map(|(i, c)| (i, c.log_evidence - own.log_evidence))
         .collect();
     let most = pairs.iter().map(|(_, gain)| *gain).fold(f64::NEG_INFINITY, f64::max);
-    let least = k.pair_folded_nats[1].max(most - k.alias_nats);
+    let least = k.pair_folded_nats.max(most - k.alias_nats);
     pairs.into_iter().filter(|(_, gain)| *gain > least).map(|(i, _)| i).collect()
 }
 
@@ -348,19 +347,13 @@ fn fold_pairs(fitted: &Fitted, probabilities: &mut [f64]) {
         }));
         let evidence: Vec<f64> = heirs.iter().map(|&i| candidates[i].log_evidence / k.temper).collect();
         let total = crate::gaussian::log_sum_exp(&evidence);
-        let weight = probabilities[pair] * folded(k, own.log_evidence - best);
+        let weight =
+            probabilities[pair] * k.pair_folded[usize::from(own.log_evidence - best > k.pair_folded_nats)];
         probabilities[pair] -= weight;
         for (i, e) in heirs.iter().zip(&evidence) {
             probabilities[*i] += weight * (e - total).exp();
         }
     }
-}
-
-/// The share of its weight that a pair gives to its members, of which it raises the log evidence by this gain.
-fn folded(k: &Constants, gain: f64) -> f64 {
-    let [from, to] = k.pair_folded_nats;
-    let [small, large] = k.pair_folded;
-    small + (large - small) * ((gain - from) / (to - from)).clamp(0.0, 1.0)
 }
 
 /// The members of a pair that alone say nearly as much as it does, of a gap of this chi2.

@@ -131,6 +131,16 @@ pub fn fit_believing(table: &Table, rig: &RigFile, options: &Options, belief: &B
     };
     progress.with("causes that the library does not name", SINGLES_END, || leading(&candidates));
     let leader = candidates.first().filter(|c| c.log_evidence > none_evidence + k.pairs_from_nats);
+    let gap = leader.is_some() || discrepancy.log_evidence > none_evidence + k.pairs_from_nats;
+    if let (Belief::Judged, true, Some(other)) =
+        (belief, gap, scatter.about_baseline(&problem, &none.prediction))
+    {
+        // Where a few passes that lie apart are all that the baseline does not explain, they are no gap.
+        let without = fit_believing(table, rig, options, &other);
+        if without.none_probability > 0.5 {
+            return without;
+        }
+    }
     if let (Belief::Judged, Some(leader)) = (belief, leader) {
         let departed = leader.best.departed(&basis);
         if let Some(other) = scatter.about_cause(&problem, &(&leader.best.prediction + departed)) {

@@ -100,6 +100,8 @@ const HALF_NORMAL_MEDIAN: f64 = 0.6745;
 const FAR_SD: f64 = 4.5;
 /// Bounds of the baseline's level over the measured one.
 const UNDER: [f64; 2] = [0.5, 2.0];
+/// Largest share of the passes that may be bad where the baseline explains all others.
+const FEW: f64 = 0.05;
 /// Passes' worth of weight that is worth another fit.
 const WORTH: f64 = 2.0;
 
@@ -250,6 +252,18 @@ impl Scatter {
         let regained: f64 =
             (0..n).filter(|&i| !called(&outside[i])).map(|i| weight[i] - 1.0 / self.inflation[i]).sum();
         (found || regained > WORTH).then_some(Belief::AboutCause { deviations, outside })
+    }
+
+    /// The same about the recalibrated baseline, where that makes a few more passes suspect.
+    pub fn about_baseline(&self, problem: &Problem, mean: &DVector<f64>) -> Option<Belief> {
+        let suspects =
+            |outside: &[f64]| outside.iter().filter(|o| **o > problem.constants.suspect_probability).count();
+        let few = |outside: &[f64]| {
+            suspects(outside) > suspects(&self.outside)
+                && suspects(outside) as f64 <= FEW * problem.len() as f64
+        };
+        let about = self.about_cause(problem, mean);
+        about.filter(|belief| matches!(belief, Belief::AboutCause { outside, .. } if few(outside)))
     }
 
     /// Enters a problem whose variances are those of single passes: what passes have in common leaves them

@@ -171,6 +171,16 @@ fn what_is_left_out_is_no_member_of_a_pair() {
     }
 }
 
+/// One pass of 98 is off by 17 deviations, and no cause acts (`--seed 29129001`, set 151). A surface bends to a
+/// pass that lies apart: it was a gap of an unknown cause at 0.84.
+#[test]
+fn isolated_bad_passes_are_no_gap() {
+    let report = report("no_gap.bad_passes", &Options::default());
+    assert_eq!(report.verdict, Verdict::NoGap, "{}", report.text);
+    let suspects: Vec<u64> = report.scatter.suspects.iter().map(|s| s.point).collect();
+    assert_eq!(suspects, [47], "{:?}", report.remarks);
+}
+
 /// Of each set the cause, which comes before a dot in its name.
 fn named(sets: &[&str]) {
     sets.par_iter().for_each(|set| {
