@@ -95,8 +95,7 @@ impl LowPass {
         Self {
             b: [b0, 2.0 * b0, b0],
             a: [2.0 * (k * k - 1.0) * norm, (1.0 - k / q + k * k) * norm],
-            z: [0.0; 2],
-            through: false,
+            ..Self::default()
         }
     }
 

@@ -54,12 +54,8 @@ impl ForceSensor for VirtualRig {
     fn read(&mut self, now: Nanos) -> Forces {
         self.world.advance_to(now);
         let unstated = Nanos::from_seconds(self.world.config().sensor.unstated_latency_s);
-        match self.world.force_sample() {
-            None => Forces::missing(NoData::NeverRead),
-            Some(sample) => {
-                Forces { lateral: reading(&sample, 0, unstated), normal: reading(&sample, 1, unstated) }
-            }
-        }
+        let Some(sample) = self.world.force_sample() else { return Forces::missing(NoData::NeverRead) };
+        Forces { lateral: reading(&sample, 0, unstated), normal: reading(&sample, 1, unstated) }
     }
 }
 

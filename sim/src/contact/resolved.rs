@@ -138,11 +138,8 @@ impl March {
         }
         let omega = 2.0 * PI * contact.frequency_hz;
         let dt = 1.0 / (contact.frequency_hz * self.steps as f64);
-        let (m, c, k) = (
-            contact.ridge.mass_kg.max(LIGHTEST_KG),
-            contact.ridge.damping_n_s_per_m,
-            contact.normal_stiffness_n_per_m,
-        );
+        let m = contact.ridge.mass_kg.max(LIGHTEST_KG);
+        let (k, c) = (contact.normal_stiffness_n_per_m, contact.ridge.damping_n_s_per_m);
         let map = transition(k, c, m, dt);
         let a = contact.sine_amplitude_m;
         let (turn_s, turn_c) = (omega * dt).sin_cos();

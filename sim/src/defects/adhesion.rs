@@ -9,13 +9,11 @@ pub(super) const KIND: DefectKind = DefectKind {
         Parameter::log("development_n", 0.01, 0.1),
         Parameter::linear("speed_exponent", 0.1, 0.4),
     ],
-    act: Act::Contact(act),
+    act: Act::Contact(|v, _, contact| {
+        contact.limit.adhesion_n = v[0] * (contact.speed_m_s / REFERENCE_M_S).powf(v[2]);
+        contact.limit.adhesion_scale_n = v[1];
+    }),
     ..DefectKind::cause(Location::Contact, "attraction adds to the load that friction feels")
 };
 
 const REFERENCE_M_S: f64 = 0.02;
-
-fn act(v: &Values, _: &Surroundings, contact: &mut Contact) {
-    contact.limit.adhesion_n = v[0] * (contact.speed_m_s / REFERENCE_M_S).powf(v[2]);
-    contact.limit.adhesion_scale_n = v[1];
-}

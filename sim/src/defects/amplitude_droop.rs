@@ -10,13 +10,11 @@ pub(super) const KIND: DefectKind = DefectKind {
         Parameter::log("load_ratio_at_1_n", 0.01, 3.0),
         Parameter::linear("flight_per_um", 0.1, 0.6),
     ],
-    act: Act::Plate(act),
+    act: Act::Plate(|v, at, pp_m| {
+        let area = at.normal_force_n.max(0.0).cbrt().powi(2);
+        // The larger the swing under a load, the smaller the part of the cycle in which the finger touches.
+        let touched = 1.0 / (1.0 + v[1] * pp_m * 1e6 * (1.0 - area).max(0.0));
+        pp_m / (1.0 + v[0] * area * touched)
+    }),
     ..DefectKind::cause(Location::Plate, "the plate's amplitude droops under the finger's load")
 };
-
-fn act(v: &Values, at: &Surroundings, pp_m: f64) -> f64 {
-    let area = at.normal_force_n.max(0.0).cbrt().powi(2);
-    // The larger the swing under a load, the smaller the part of the cycle in which the finger touches.
-    let touched = 1.0 / (1.0 + v[1] * pp_m * 1e6 * (1.0 - area).max(0.0));
-    pp_m / (1.0 + v[0] * area * touched)
-}

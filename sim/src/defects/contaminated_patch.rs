@@ -9,11 +9,9 @@ pub(super) const KIND: DefectKind = DefectKind {
         Parameter::log("width_m", 2e-3, 8e-3),
     ],
     in_library: false,
-    act: Act::Contact(act),
+    act: Act::Contact(|v, at, contact| {
+        let bump = (-0.5 * ((at.position_m - v[1]) / v[2]).powi(2)).exp();
+        contact.friction *= (1.0 + v[0] * bump).max(0.05);
+    }),
     ..DefectKind::cause(Location::Plate, "friction differs on a patch of the plate")
 };
-
-fn act(v: &Values, at: &Surroundings, contact: &mut Contact) {
-    let bump = (-0.5 * ((at.position_m - v[1]) / v[2]).powi(2)).exp();
-    contact.friction *= (1.0 + v[0] * bump).max(0.05);
-}

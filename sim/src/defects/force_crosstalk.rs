@@ -9,12 +9,10 @@ pub(super) const KIND: DefectKind = DefectKind {
         Parameter::linear("normal_per_lateral", 0.0, 0.02),
     ],
     imitated: true,
-    act: Act::Forces(act),
+    act: Act::Forces(|v, _, forces| {
+        let Forces { lateral_n, normal_n } = *forces;
+        forces.lateral_n = lateral_n + v[0] * normal_n;
+        forces.normal_n = normal_n + v[1] * lateral_n;
+    }),
     ..DefectKind::cause(Location::Instrument, "a share of each force shows in the other channel")
 };
-
-fn act(v: &Values, _: &Surroundings, forces: &mut Forces) {
-    let Forces { lateral_n, normal_n } = *forces;
-    forces.lateral_n = lateral_n + v[0] * normal_n;
-    forces.normal_n = normal_n + v[1] * lateral_n;
-}

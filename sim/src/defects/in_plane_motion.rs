@@ -6,12 +6,10 @@ use super::*;
 pub(super) const KIND: DefectKind = DefectKind {
     parameters: &[Parameter::log("share", 0.003, 0.5), Parameter::linear("phase_rad", 0.0, 6.2)],
     in_library: false,
-    act: Act::Contact(act),
+    act: Act::Contact(|v, at, contact| {
+        contact.motion.in_plane = v[0];
+        // Seen along the sliding direction the phase turns by half a turn when the direction does.
+        contact.motion.in_plane_phase_rad = v[1] + if at.direction < 0.0 { std::f64::consts::PI } else { 0.0 };
+    }),
     ..DefectKind::cause(Location::Plate, "the plate also vibrates along the sliding direction")
 };
-
-fn act(v: &Values, at: &Surroundings, contact: &mut Contact) {
-    contact.motion.in_plane = v[0];
-    // Seen along the sliding direction the phase turns by half a turn when the direction does.
-    contact.motion.in_plane_phase_rad = v[1] + if at.direction < 0.0 { std::f64::consts::PI } else { 0.0 };
-}

@@ -8,11 +8,9 @@ pub(super) const KIND: DefectKind = DefectKind {
         Parameter::linear("start_over_end", -1.0, 1.0),
         Parameter::log("time_s", 40.0, 600.0),
     ],
-    act: Act::Forces(act),
+    act: Act::Forces(|v, at, forces| {
+        let settled = 1.0 - (-at.time_s / v[2]).exp();
+        forces.lateral_n += v[0] * (v[1] + (1.0 - v[1]) * settled);
+    }),
     ..DefectKind::cause(Location::Instrument, "the zero of the lateral force is off and drifts")
 };
-
-fn act(v: &Values, at: &Surroundings, forces: &mut Forces) {
-    let settled = 1.0 - (-at.time_s / v[2]).exp();
-    forces.lateral_n += v[0] * (v[1] + (1.0 - v[1]) * settled);
-}

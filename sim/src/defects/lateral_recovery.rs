@@ -6,10 +6,8 @@ use super::*;
 
 pub(super) const KIND: DefectKind = DefectKind {
     parameters: &[Parameter::log("slowness_s_per_m", 10.0, 1000.0), Parameter::log("knee_m", 3e-8, 3e-7)],
-    act: Act::Contact(act),
+    act: Act::Contact(|v, _, contact| {
+        contact.recovery = crate::contact::Recovery::Soft { speed_m_s: 1.0 / v[0], knee_m: v[1] };
+    }),
     ..DefectKind::cause(Location::Contact, "ridges recover their lateral stretch at a finite speed")
 };
-
-fn act(v: &Values, _: &Surroundings, contact: &mut Contact) {
-    contact.recovery = crate::contact::Recovery::Soft { speed_m_s: 1.0 / v[0], knee_m: v[1] };
-}

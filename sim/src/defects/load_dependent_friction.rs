@@ -6,14 +6,12 @@ use super::*;
 
 pub(super) const KIND: DefectKind = DefectKind {
     parameters: &[Parameter::log("area_share", 0.01, 0.95)],
-    act: Act::Contact(act),
+    act: Act::Contact(|v, _, contact| {
+        contact.limit.area_share = v[0].min(1.0);
+        contact.limit.area_reference_n = REFERENCE_N;
+    }),
     ..DefectKind::cause(Location::Contact, "part of the friction limit grows as the 2/3 power of the force")
 };
 
 /// Force at which the share leaves the friction as it was (N).
 const REFERENCE_N: f64 = 0.25;
-
-fn act(v: &Values, _: &Surroundings, contact: &mut Contact) {
-    contact.limit.area_share = v[0].min(1.0);
-    contact.limit.area_reference_n = REFERENCE_N;
-}

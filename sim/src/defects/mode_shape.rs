@@ -11,18 +11,16 @@ pub(super) const KIND: DefectKind = DefectKind {
         Parameter::log("half_wave_at_25_khz_m", 8e-3, 2e-2),
         Parameter::linear("edge_over_wave", 0.1, 0.4),
     ],
-    act: Act::Plate(act),
+    act: Act::Plate(|v, at, pp_m| {
+        let half_wave = v[2] * (25e3 / at.frequency_hz.max(1.0)).sqrt();
+        let phase = std::f64::consts::PI * at.position_m / half_wave + v[1];
+        // Standing wave with the given share; the rest travels and leaves no node.
+        // A bending wave's near field decays over a half wave over pi.
+        let edge = v[0] * v[3] * (-std::f64::consts::PI * (at.position_m + EDGE_M) / half_wave).exp();
+        pp_m * (1.0 - v[0] + v[0] * phase.cos().abs() + edge)
+    }),
     ..DefectKind::cause(Location::Plate, "the amplitude depends on the position along the plate")
 };
 
 /// Distance of the driven edge from the middle of the stroke (m).
 const EDGE_M: f64 = 0.02;
-
-fn act(v: &Values, at: &Surroundings, pp_m: f64) -> f64 {
-    let half_wave = v[2] * (25e3 / at.frequency_hz.max(1.0)).sqrt();
-    let phase = std::f64::consts::PI * at.position_m / half_wave + v[1];
-    // Standing wave with the given share; the rest travels and leaves no node.
-    // A bending wave's near field decays over a half wave over pi.
-    let edge = v[0] * v[3] * (-std::f64::consts::PI * (at.position_m + EDGE_M) / half_wave).exp();
-    pp_m * (1.0 - v[0] + v[0] * phase.cos().abs() + edge)
-}

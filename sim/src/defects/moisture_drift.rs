@@ -9,15 +9,13 @@ pub(super) const KIND: DefectKind = DefectKind {
         Parameter::log("half_time_s", 15.0, 400.0),
         Parameter::linear("softening", 0.0, 0.15),
     ],
-    act: Act::Contact(act),
+    act: Act::Contact(|v, at, contact| {
+        let t = at.contact_time_s;
+        let uptake = 0.8 * t / (t + v[1]) + 0.2 * (1.0 - (-t / (8.0 * v[1])).exp());
+        contact.friction *= (1.0 + v[0] * uptake).max(0.05);
+        let soft = 1.0 - v[2] * uptake * v[0].abs().min(1.0);
+        contact.normal_stiffness_n_per_m *= soft;
+        contact.lateral_stiffness_n_per_m *= soft;
+    }),
     ..DefectKind::cause(Location::Contact, "friction and softness change with the time in contact")
 };
-
-fn act(v: &Values, at: &Surroundings, contact: &mut Contact) {
-    let t = at.contact_time_s;
-    let uptake = 0.8 * t / (t + v[1]) + 0.2 * (1.0 - (-t / (8.0 * v[1])).exp());
-    contact.friction *= (1.0 + v[0] * uptake).max(0.05);
-    let soft = 1.0 - v[2] * uptake * v[0].abs().min(1.0);
-    contact.normal_stiffness_n_per_m *= soft;
-    contact.lateral_stiffness_n_per_m *= soft;
-}

@@ -7,11 +7,9 @@ use super::*;
 
 pub(super) const KIND: DefectKind = DefectKind {
     parameters: &[Parameter::log("retardation_s", 3e-8, 1e-5)],
-    act: Act::Contact(act),
+    act: Act::Contact(|v, _, contact| {
+        contact.ridge.mass_kg = contact.ridge.mass_kg.max(1e-7);
+        contact.ridge.damping_n_s_per_m += v[0] * contact.normal_stiffness_n_per_m;
+    }),
     ..DefectKind::cause(Location::Contact, "ridges are damped on their normal spring")
 };
-
-fn act(v: &Values, _: &Surroundings, contact: &mut Contact) {
-    contact.ridge.mass_kg = contact.ridge.mass_kg.max(1e-7);
-    contact.ridge.damping_n_s_per_m += v[0] * contact.normal_stiffness_n_per_m;
-}

@@ -5,10 +5,8 @@ use super::*;
 
 pub(super) const KIND: DefectKind = DefectKind {
     parameters: &[Parameter::signed("offset_n", 1.5e-3, 0.12), Parameter::linear("sinking", 0.1, 0.5)],
-    act: Act::Forces(act),
+    act: Act::Forces(|v, at, forces| {
+        forces.normal_n += v[0] * (1.0 - v[1] * (1.0 - (-at.time_s / 200.0).exp()));
+    }),
     ..DefectKind::cause(Location::Instrument, "the zero of the normal force is off")
 };
-
-fn act(v: &Values, at: &Surroundings, forces: &mut Forces) {
-    forces.normal_n += v[0] * (1.0 - v[1] * (1.0 - (-at.time_s / 200.0).exp()));
-}

@@ -8,18 +8,16 @@ pub(super) const KIND: DefectKind = DefectKind {
         Parameter::linear("wave_over_tilt", -0.6, 0.6),
     ],
     imitated: true,
-    act: Act::Forces(act),
+    act: Act::Forces(|v, at, forces| {
+        let wave = (2.0 * std::f64::consts::PI * at.position_m / WAVE_M).sin();
+        let tilt = v[0] * (1.0 + v[1] * wave);
+        let (sin, cos) = tilt.sin_cos();
+        let Forces { lateral_n, normal_n } = *forces;
+        forces.lateral_n = lateral_n * cos + normal_n * sin;
+        forces.normal_n = normal_n * cos - lateral_n * sin;
+    }),
     ..DefectKind::cause(Location::Instrument, "the plate is tilted against the sensor")
 };
 
 /// Length of the waves (m).
 const WAVE_M: f64 = 0.012;
-
-fn act(v: &Values, at: &Surroundings, forces: &mut Forces) {
-    let wave = (2.0 * std::f64::consts::PI * at.position_m / WAVE_M).sin();
-    let tilt = v[0] * (1.0 + v[1] * wave);
-    let (sin, cos) = tilt.sin_cos();
-    let Forces { lateral_n, normal_n } = *forces;
-    forces.lateral_n = lateral_n * cos + normal_n * sin;
-    forces.normal_n = normal_n * cos - lateral_n * sin;
-}

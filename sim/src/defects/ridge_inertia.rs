@@ -11,14 +11,12 @@ pub(super) const KIND: DefectKind = DefectKind {
         Parameter::log("damping_ratio", 0.3, 1.0),
         Parameter::log("skin_loss", 0.15, 0.6),
     ],
-    act: Act::Contact(act),
+    act: Act::Contact(|v, _, contact| {
+        let critical = 2.0 * (contact.normal_stiffness_n_per_m * v[0]).sqrt();
+        contact.ridge.mass_kg = v[0];
+        contact.ridge.damping_n_s_per_m = v[1] * critical;
+        contact.ridge.skin_ratio = 20.0;
+        contact.ridge.skin_loss = v[2];
+    }),
     ..DefectKind::cause(Location::Contact, "ridges have mass: they overshoot, fly and land")
 };
-
-fn act(v: &Values, _: &Surroundings, contact: &mut Contact) {
-    let critical = 2.0 * (contact.normal_stiffness_n_per_m * v[0]).sqrt();
-    contact.ridge.mass_kg = v[0];
-    contact.ridge.damping_n_s_per_m = v[1] * critical;
-    contact.ridge.skin_ratio = 20.0;
-    contact.ridge.skin_loss = v[2];
-}

@@ -6,12 +6,10 @@ use super::*;
 pub(super) const KIND: DefectKind = DefectKind {
     parameters: &[Parameter::log("ratio_at_2_um", 0.01, 0.6), Parameter::linear("phase_rad", 0.0, 6.2)],
     in_library: false,
-    act: Act::Contact(act),
+    act: Act::Contact(|v, _, contact| {
+        let swing = 2.0 * contact.sine_amplitude_m / 2e-6;
+        contact.motion.second_harmonic = (v[0] * swing.min(2.0)).min(0.9);
+        contact.motion.second_phase_rad = v[1];
+    }),
     ..DefectKind::cause(Location::Plate, "the plate also vibrates at twice the frequency")
 };
-
-fn act(v: &Values, _: &Surroundings, contact: &mut Contact) {
-    let swing = 2.0 * contact.sine_amplitude_m / 2e-6;
-    contact.motion.second_harmonic = (v[0] * swing.min(2.0)).min(0.9);
-    contact.motion.second_phase_rad = v[1];
-}

@@ -5,11 +5,9 @@ use super::*;
 pub(super) const KIND: DefectKind = DefectKind {
     parameters: &[Parameter::factor("factor", 0.02, 0.8)],
     imitated: true,
-    act: Act::Contact(act),
+    act: Act::Contact(|v, _, contact| {
+        let speed = contact.speed_m_s;
+        contact.speed_m_s = speed * (1.0 + (v[0] - 1.0) * (0.9 + 0.2 * speed / (speed + 0.05)));
+    }),
     ..DefectKind::cause(Location::Instrument, "the true sliding speed is not the one stated")
 };
-
-fn act(v: &Values, _: &Surroundings, contact: &mut Contact) {
-    let speed = contact.speed_m_s;
-    contact.speed_m_s = speed * (1.0 + (v[0] - 1.0) * (0.9 + 0.2 * speed / (speed + 0.05)));
-}

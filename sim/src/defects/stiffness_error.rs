@@ -7,11 +7,9 @@ use super::*;
 pub(super) const KIND: DefectKind = DefectKind {
     parameters: &[Parameter::factor("factor", 0.04, 1.8), Parameter::linear("angle_rad", -0.46, 2.0)],
     imitated: true,
-    act: Act::Contact(act),
+    act: Act::Contact(|v, _, contact| {
+        contact.normal_stiffness_n_per_m *= v[0].powf(v[1].cos());
+        contact.lateral_stiffness_n_per_m *= v[0].powf(v[1].sin());
+    }),
     ..DefectKind::cause(Location::Finger, "the true stiffnesses are far from the nominal ones")
 };
-
-fn act(v: &Values, _: &Surroundings, contact: &mut Contact) {
-    contact.normal_stiffness_n_per_m *= v[0].powf(v[1].cos());
-    contact.lateral_stiffness_n_per_m *= v[0].powf(v[1].sin());
-}

@@ -9,12 +9,10 @@ pub(super) const KIND: DefectKind = DefectKind {
         Parameter::log("time_s", 1.0, 30.0),
         Parameter::linear("lateral_over_normal", 0.2, 1.5),
     ],
-    act: Act::Contact(act),
+    act: Act::Contact(|v, at, contact| {
+        let crept = (1.0 + at.contact_time_s.max(0.0) / v[1]).powf(0.25) - 1.0;
+        contact.normal_stiffness_n_per_m /= 1.0 + v[0] * crept;
+        contact.lateral_stiffness_n_per_m /= 1.0 + v[2] * v[0] * crept;
+    }),
     ..DefectKind::cause(Location::Contact, "the tissue under the ridges creeps with the time in contact")
 };
-
-fn act(v: &Values, at: &Surroundings, contact: &mut Contact) {
-    let crept = (1.0 + at.contact_time_s.max(0.0) / v[1]).powf(0.25) - 1.0;
-    contact.normal_stiffness_n_per_m /= 1.0 + v[0] * crept;
-    contact.lateral_stiffness_n_per_m /= 1.0 + v[2] * v[0] * crept;
-}

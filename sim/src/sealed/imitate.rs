@@ -7,7 +7,7 @@
 
 use super::bench::NoiseFree;
 use super::form::{Kernel, solved};
-use super::oracle::{Case, Fit, NUISANCES, moved};
+use super::oracle::{Case, Fit, NUISANCES, Theta, moved};
 use crate::defects::{ALL, Defect, DefectKind, Defects, Draw, Parameter, Values, compatible};
 use crate::noise::Noise;
 use serde::{Deserialize, Serialize};
@@ -36,6 +36,11 @@ const STEPS: usize = 8;
 const FORM_STEPS: usize = 3;
 /// Most unknowns: nuisances and a kind's four parameters.
 const UNKNOWNS: usize = NUISANCES + 4;
+/// Logarithms of the nuisances, then the parameters' coordinates.
+type Unknowns = [f64; UNKNOWNS];
+/// The matrix and the right side of normal equations.
+type Equations = ([Unknowns; UNKNOWNS], Unknowns);
+type Kind = &'static DefectKind;
 
 /// Another cause, at the size at which it imitates the data best.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
@@ -54,10 +59,10 @@ pub struct Imitator {
     pub form_left: Option<f64>,
 }
 
-/// Where a search stands: logarithms of the nuisances, then the parameters' coordinates.
+/// Where a search stands.
 #[derive(Clone, Copy)]
 struct State {
-    x: [f64; UNKNOWNS],
+    x: Unknowns,
     chi2: f64,
     /// Whether it was searched, not only read off the ladder.
     searched: bool,
@@ -86,11 +91,11 @@ fn lowest(p: &Parameter) -> f64 {
     if matches!(p.draw, Draw::Signed | Draw::Factor) { -1.0 } else { 0.0 }
 }
 
-fn values_of(kind: &DefectKind, x: &[f64; UNKNOWNS]) -> Values {
+fn values_of(kind: &DefectKind, x: &Unknowns) -> Values {
     std::array::from_fn(|i| kind.parameters.get(i).map_or(0.0, |p| value(p, x[NUISANCES + i])))
 }
 
-fn theta(x: &[f64; UNKNOWNS]) -> [f64; NUISANCES] {
+fn theta(x: &Unknowns) -> Theta {
     std::array::from_fn(|i| x[i])
 }
 
@@ -116,7 +121,7 @@ impl Case<'_> {
         let dear = |kind: &DefectKind| DEAR.contains(&kind.name);
         let among_dear = truth.iter().chain(self.beside).any(|d| dear(d.kind));
         let kernel = std::cell::OnceCell::new();
-        let one = |kind: &'static DefectKind| {
+        let one = |kind: Kind| {
             let mut state = if dear(kind) && !whole && thinned_gap > LIKE * gap {
                 let worth = if among_dear { WORTH } else { WORTH_DEAR };
                 let tried = thinned.imitate(kind, &thinned_base, truth_chi2, near, worth);
@@ -188,7 +193,7 @@ impl Case<'_> {
 
     /// The rungs of each draw's ladder that leave least, best first: chi2 with the nuisances refitted to
     /// first order, and the parameters.
-    fn ladder(&self, kind: &'static DefectKind, base: &Fit) -> Vec<(f64, Values)> {
+    fn ladder(&self, kind: Kind, base: &Fit) -> Vec<(f64, Values)> {
         let sides = if matches!(kind.parameters[0].draw, Draw::Log | Draw::Linear) { 1 } else { 2 };
         // Every side of the size with the first shape over its range.
         let (shapes, rungs) = match kind.parameters.len() > 1 {
@@ -222,14 +227,7 @@ impl Case<'_> {
     }
 
     /// A cause's best imitation from the two best draws of its ladder.
-    fn imitate(
-        &self,
-        kind: &'static DefectKind,
-        base: &Fit,
-        truth_chi2: f64,
-        near: f64,
-        worth: f64,
-    ) -> State {
+    fn imitate(&self, kind: Kind, base: &Fit, truth_chi2: f64, near: f64, worth: f64) -> State {
         let mut best: Option<State> = None;
         let ladder = self.ladder(kind, base);
         let first = ladder[0].0;
@@ -261,19 +259,19 @@ impl Case<'_> {
     }
 
     /// Levenberg-Marquardt within the bounds of the kind's own ranges.
-    fn search(&self, kind: &'static DefectKind, start: State, truth_chi2: f64, near: f64) -> State {
+    fn search(&self, kind: Kind, start: State, truth_chi2: f64, near: f64) -> State {
         let n = NUISANCES + kind.parameters.len();
-        let run = |x: &[f64; UNKNOWNS]| self.run(kind, x);
+        let run = |x: &Unknowns| self.run(kind, x);
         let mut at = start;
         let mut model = run(&at.x);
         at.chi2 = self.chi2(&model, theta(&at.x));
         let mut damping = 1e-3;
         for _ in 0..STEPS {
             let columns = self.columns(kind, &at.x, &model);
-            let (a, b) = self.normal_equations(&columns, &self.standardised(&model), theta(&at.x));
+            let equations = self.normal_equations(&columns, &self.standardised(&model), theta(&at.x));
             let before = at.chi2;
             for _ in 0..5 {
-                let next = bounded_step(kind, &a, &b, damping, &at.x, n);
+                let next = bounded_step(kind, &equations, damping, &at.x, n);
                 let trial = run(&next);
                 let chi2 = self.chi2(&trial, theta(&next));
                 if chi2 < at.chi2 {
@@ -292,12 +290,12 @@ impl Case<'_> {
         at
     }
 
-    fn run(&self, kind: &'static DefectKind, x: &[f64; UNKNOWNS]) -> Vec<f64> {
+    fn run(&self, kind: Kind, x: &Unknowns) -> Vec<f64> {
         self.predict(&moved(&self.nominal, theta(x)), &Defects::one(kind, values_of(kind, x)))
     }
 
     /// Derivatives of the model in standard deviations.
-    fn columns(&self, kind: &'static DefectKind, at: &[f64; UNKNOWNS], model: &[f64]) -> Vec<Vec<f64>> {
+    fn columns(&self, kind: Kind, at: &Unknowns, model: &[f64]) -> Vec<Vec<f64>> {
         let one = |k: usize| {
             let mut x = *at;
             let h = if k < NUISANCES || x[k] < 0.5 { 2e-3 } else { -2e-3 };
@@ -310,13 +308,7 @@ impl Case<'_> {
 
     /// Cost of an imitation that may depart from its form, from the optimum without departures: where the
     /// departure takes up what is smooth, another size may do better.
-    fn form_cost(
-        &self,
-        kind: &'static DefectKind,
-        start: [f64; UNKNOWNS],
-        kernel: &Kernel,
-        base: &Fit,
-    ) -> f64 {
+    fn form_cost(&self, kind: Kind, start: Unknowns, kernel: &Kernel, base: &Fit) -> f64 {
         let mut x = start;
         let mut model = self.run(kind, &x);
         let mut now = self.departure(kernel, &model, self.prior(theta(&x)), base);
@@ -325,8 +317,8 @@ impl Case<'_> {
             let whitened: Vec<Vec<f64>> =
                 self.columns(kind, &x, &model).iter().map(|c| solved(&root, c, 0)).collect();
             let residual = solved(&root, &self.standardised(&model), 0);
-            let (a, b) = self.normal_equations(&whitened, &residual, theta(&x));
-            let next = bounded_step(kind, &a, &b, 1e-3, &x, whitened.len());
+            let equations = self.normal_equations(&whitened, &residual, theta(&x));
+            let next = bounded_step(kind, &equations, 1e-3, &x, whitened.len());
             let trial = self.run(kind, &next);
             let then = self.departure(kernel, &trial, self.prior(theta(&next)), base);
             if then.cost > now.cost - 0.1 {
@@ -338,12 +330,7 @@ impl Case<'_> {
     }
 
     /// Normal equations of nuisances and parameters, the stiffnesses' priors included.
-    fn normal_equations(
-        &self,
-        columns: &[Vec<f64>],
-        residual: &[f64],
-        theta: [f64; NUISANCES],
-    ) -> ([[f64; UNKNOWNS]; UNKNOWNS], [f64; UNKNOWNS]) {
+    fn normal_equations(&self, columns: &[Vec<f64>], residual: &[f64], theta: Theta) -> Equations {
         let dot = |p: &[f64], q: &[f64]| p.iter().zip(q).map(|(x, y)| x * y).sum::<f64>();
         let (mut a, mut b) = ([[0.0; UNKNOWNS]; UNKNOWNS], [0.0; UNKNOWNS]);
         let weight = self.stiffness_sd.powi(-2);
@@ -364,14 +351,7 @@ impl Case<'_> {
 
 /// The damped step, nuisances held within a factor, parameters within their ranges: those that a step would
 /// carry out stay at the bound and the others follow.
-fn bounded_step(
-    kind: &DefectKind,
-    a: &[[f64; UNKNOWNS]; UNKNOWNS],
-    b: &[f64; UNKNOWNS],
-    damping: f64,
-    at: &[f64; UNKNOWNS],
-    n: usize,
-) -> [f64; UNKNOWNS] {
+fn bounded_step(kind: &DefectKind, (a, b): &Equations, damping: f64, at: &Unknowns, n: usize) -> Unknowns {
     let bounds = |i: usize| match i.checked_sub(NUISANCES) {
         Some(k) => (lowest(&kind.parameters[k]), 1.0),
         None => (at[i] - 0.4, at[i] + 0.4),

@@ -10,6 +10,10 @@ use crate::world::{Point, steady_forces};
 
 /// Nuisances: ln of k_n, k_l, mu0.
 pub(super) const NUISANCES: usize = 3;
+/// The nuisances' shifts.
+pub(super) type Theta = [f64; NUISANCES];
+/// Derivatives of a model by each of them, in standard deviations.
+pub(super) type Jacobian = [Vec<f64>; NUISANCES];
 
 /// The question put to the oracle.
 pub struct Case<'a> {
@@ -41,7 +45,7 @@ pub struct Fit {
 }
 
 /// A fingertip whose nuisances are moved by these logarithms.
-pub(super) fn moved(finger: &Finger, theta: [f64; NUISANCES]) -> Finger {
+pub(super) fn moved(finger: &Finger, theta: Theta) -> Finger {
     let mut out = *finger;
     out.normal_stiffness_n_per_m *= theta[0].exp();
     out.lateral_stiffness_n_per_m *= theta[1].exp();
@@ -73,17 +77,17 @@ impl Case<'_> {
         self.known.iter().map(one).collect()
     }
 
-    pub(super) fn chi2(&self, model: &[f64], theta: [f64; NUISANCES]) -> f64 {
+    pub(super) fn chi2(&self, model: &[f64], theta: Theta) -> f64 {
         self.standardised(model).into_iter().map(|z| z.powi(2)).sum::<f64>() + self.prior(theta)
     }
 
     /// What the stiffnesses' shifts cost.
-    pub(super) fn prior(&self, theta: [f64; NUISANCES]) -> f64 {
+    pub(super) fn prior(&self, theta: Theta) -> f64 {
         (theta[0] / self.stiffness_sd).powi(2) + (theta[1] / self.stiffness_sd).powi(2)
     }
 
     /// Logarithms of a fingertip's nuisances over the nominal ones.
-    pub(super) fn logarithms(&self, finger: &Finger) -> [f64; NUISANCES] {
+    pub(super) fn logarithms(&self, finger: &Finger) -> Theta {
         [
             (finger.normal_stiffness_n_per_m / self.nominal.normal_stiffness_n_per_m).ln(),
             (finger.lateral_stiffness_n_per_m / self.nominal.lateral_stiffness_n_per_m).ln(),
@@ -128,12 +132,7 @@ impl Case<'_> {
         Fit { chi2, finger: moved(&self.nominal, theta), residual_n }
     }
 
-    pub(super) fn jacobian(
-        &self,
-        theta: [f64; NUISANCES],
-        defects: &Defects,
-        model: &[f64],
-    ) -> [Vec<f64>; NUISANCES] {
+    pub(super) fn jacobian(&self, theta: Theta, defects: &Defects, model: &[f64]) -> Jacobian {
         std::array::from_fn(|k| {
             let mut up = theta;
             up[k] += 1e-3;
@@ -142,12 +141,7 @@ impl Case<'_> {
         })
     }
 
-    fn gauss_newton(
-        &self,
-        jacobian: &[Vec<f64>; NUISANCES],
-        model: &[f64],
-        theta: [f64; NUISANCES],
-    ) -> Option<[f64; NUISANCES]> {
+    fn gauss_newton(&self, jacobian: &Jacobian, model: &[f64], theta: Theta) -> Option<Theta> {
         let weight = self.stiffness_sd.powi(-2);
         let mut a = [[0.0; NUISANCES]; NUISANCES];
         let mut b = [0.0; NUISANCES];
@@ -167,12 +161,7 @@ impl Case<'_> {
     }
 
     /// chi2 left by a model with the nuisances refitted to first order.
-    pub(super) fn left(
-        &self,
-        jacobian: &[Vec<f64>; NUISANCES],
-        model: &[f64],
-        theta: [f64; NUISANCES],
-    ) -> f64 {
+    pub(super) fn left(&self, jacobian: &Jacobian, model: &[f64], theta: Theta) -> f64 {
         let Some(step) = self.gauss_newton(jacobian, model, theta) else { return self.chi2(model, theta) };
         let residual = self.standardised(model).into_iter().enumerate().map(|(i, z)| {
             let shift: f64 = (0..NUISANCES).map(|k| jacobian[k][i] * step[k]).sum();

@@ -2,6 +2,7 @@
 
 use super::device::Device;
 use super::drive::Drive;
+use super::serial::Port;
 use super::{Service, SharedPlant};
 use instruments::FrameId;
 use instruments::bus::{CanEvent, CanPort};
@@ -17,7 +18,7 @@ use std::time::{Duration, Instant};
 
 /// The far side of a serial CAN adapter: the driver's end speaks to the adapter, this end is the bus.
 pub struct EmulatedAdapter {
-    port: Box<dyn serialport::SerialPort>,
+    port: Port,
     reader: SlcanReader,
     waiting: VecDeque<CanFrame>,
     damage: Arc<AtomicUsize>,
@@ -25,7 +26,7 @@ pub struct EmulatedAdapter {
 
 impl EmulatedAdapter {
     /// An adapter on a serial port.
-    pub fn new(port: Box<dyn serialport::SerialPort>) -> Self {
+    pub fn new(port: Port) -> Self {
         Self { port, reader: SlcanReader::default(), waiting: VecDeque::new(), damage: Arc::default() }
     }
 
@@ -56,9 +57,7 @@ impl CanPort for EmulatedAdapter {
             let left = deadline.saturating_duration_since(Instant::now()).max(Duration::from_micros(100));
             self.port.set_timeout(left)?;
             match self.port.read(&mut buffer) {
-                Ok(count) => {
-                    self.reader.push(&buffer[..count], |frame| self.waiting.push_back(frame));
-                }
+                Ok(count) => self.reader.push(&buffer[..count], |frame| self.waiting.push_back(frame)),
                 Err(_) if Instant::now() >= deadline => return Ok(None),
                 // Nobody holds the other end open just now.
                 Err(_) => std::thread::sleep(Duration::from_micros(200)),

@@ -5,7 +5,7 @@
 //! entry of the error queue.
 
 use super::device::Device;
-use super::serial::SerialEmulator;
+use super::serial::{Port, SerialEmulator};
 use super::{Command, Plant, Service, SharedPlant};
 use instruments::codec::pattern::Pattern;
 use instruments::profile::FrameKind;
@@ -52,68 +52,63 @@ impl LineInstrument {
         }
     }
 
-    fn end(&self) -> Vec<u8> {
-        self.device.profile().description.link.rx_end().into()
+    /// A line as it is sent; nothing where there is none.
+    fn line(&self, line: Option<String>) -> Vec<u8> {
+        let end = self.device.profile().description.link.rx_end();
+        line.map_or_else(Vec::new, |line| (line + end).into_bytes())
     }
 
     /// The answer to one line; empty where there is none.
     pub fn answer(&mut self, line: &str) -> Vec<u8> {
         let plant = self.plant.clone();
         let (mut plant, now) = plant.now();
-        let answer = self.say(line.trim(), &mut *plant, now);
-        match answer {
-            Answer::Nothing => Vec::new(),
-            Answer::Block(block) => block,
-            Answer::Line(line) => [line.into_bytes(), self.end()].concat(),
-        }
+        self.say(line.trim(), &mut *plant, now)
     }
 
-    fn say(&mut self, line: &str, plant: &mut dyn Plant, now: Nanos) -> Answer {
+    fn say(&mut self, line: &str, plant: &mut dyn Plant, now: Nanos) -> Vec<u8> {
         let description = &self.device.profile().description;
         if line.is_empty() {
-            return Answer::Nothing;
+            return Vec::new();
         }
         if let Some(query) = description.link.error_query.as_ref().filter(|query| query.send == line) {
             let ok = query.ok.first().cloned().unwrap_or_default();
             let status =
                 if self.error { "-113,\"Undefined header\"".into() } else { format!("{ok}\"No error\"") };
             self.error = false;
-            return Answer::Line(status);
+            return self.line(Some(status));
         }
         if let Some(init) = description.init.iter().find(|init| init.send.as_deref() == Some(line)) {
-            return Answer::of(init.expect.as_ref().and_then(|all| all.first()).cloned());
+            return self.line(init.expect.as_ref().and_then(|all| all.first()).cloned());
         }
         if let Some(choice) = &description.link.choice
             && let Some(which) = number_in(&choice.ask, line)
         {
-            return Answer::of(description.emulator.names.get(which).cloned());
+            return self.line(description.emulator.names.get(which).cloned());
         }
         if let Some((frame, index, which)) = self.query(line) {
             let query = &description.query[index];
             // A wrong unit answers as plausibly as the right one.
             let tenfold = if query.name.as_ref() == "range" { 10f64.powi(which as i32) } else { 1.0 };
             if description.link.choice.is_some() && which >= description.emulator.names.len() {
-                return Answer::Nothing;
+                return Vec::new();
             }
             let bytes = self.device.frame(frame, plant, now);
-            return match self.device.profile().frames()[frame.0].write_line(&bytes, tenfold) {
-                Some(line) => Answer::Line(line),
-                None => Answer::Block(bytes),
-            };
+            let line = self.device.profile().frames()[frame.0].write_line(&bytes, tenfold);
+            return if line.is_some() { self.line(line) } else { bytes };
         }
         match self.set(line) {
             Some((heard, answer)) => {
                 for (set, value) in heard {
                     self.error |= self.device.set(set, value, plant).is_err();
                 }
-                Answer::of(answer)
+                self.line(answer)
             }
             None => {
                 self.error = true;
                 let unknown = self.device.profile().description.link.unsolicited.last().cloned();
                 let zeros =
                     |alarm: String| Pattern::parse(&alarm).map_or(alarm, |pattern| pattern.write(&[], 0));
-                Answer::of(unknown.map(zeros))
+                self.line(unknown.map(zeros))
             }
         }
     }
@@ -158,18 +153,6 @@ fn number_in(question: &str, line: &str) -> Option<usize> {
     }
 }
 
-enum Answer {
-    Nothing,
-    Line(String),
-    Block(Vec<u8>),
-}
-
-impl Answer {
-    fn of(line: Option<String>) -> Self {
-        line.map_or(Self::Nothing, Self::Line)
-    }
-}
-
 /// Cuts bytes into lines at either line end.
 #[derive(Default)]
 struct Lines {
@@ -195,14 +178,13 @@ impl SerialEmulator {
     /// # Errors
     /// Where no thread can be had.
     pub fn lines(
-        port: Box<dyn serialport::SerialPort>,
+        port: Port,
         mut instrument: LineInstrument,
         mut alarm: impl FnMut() -> Option<String> + Send + 'static,
     ) -> io::Result<Self> {
         let mut lines = Lines::default();
         Self::start(port, move |bytes| {
-            let mut out =
-                alarm().map_or_else(Vec::new, |line| [line.into_bytes(), instrument.end()].concat());
+            let mut out = instrument.line(alarm());
             lines.push(bytes, |line| out.extend(instrument.answer(line)));
             instrument.live();
             out

@@ -10,6 +10,7 @@ use std::net::{SocketAddr, TcpListener};
 use std::pin::Pin;
 use std::sync::{Arc, Mutex, PoisonError};
 use std::task::{Context, Poll};
+use std::thread::JoinHandle;
 use std::time::{Duration, Instant};
 use tokio::io::{AsyncRead, AsyncWrite, ReadBuf};
 use tokio::sync::oneshot;
@@ -28,8 +29,8 @@ const KEEP_UP: Duration = Duration::from_millis(50);
 /// A running server; dropping it stops the server.
 pub struct ModbusTcpServer {
     address: SocketAddr,
-    stop: Option<tokio::sync::oneshot::Sender<()>>,
-    thread: Option<std::thread::JoinHandle<()>>,
+    stop: Option<oneshot::Sender<()>>,
+    thread: Option<JoinHandle<()>>,
 }
 
 impl ModbusTcpServer {
@@ -43,7 +44,7 @@ impl ModbusTcpServer {
         plant.clock.serves(&listener);
         let address = listener.local_addr()?;
         let runtime = tokio::runtime::Builder::new_current_thread().enable_all().build()?;
-        let (stop, stopped) = tokio::sync::oneshot::channel();
+        let (stop, stopped) = oneshot::channel();
         let units = Arc::new(Units { devices: Mutex::new(devices), plant });
         let thread = std::thread::Builder::new().name("modbus-tcp".into()).spawn(move || {
             runtime.block_on(async move {
@@ -64,17 +65,11 @@ impl ModbusTcpServer {
 impl Drop for ModbusTcpServer {
     fn drop(&mut self) {
         drop(self.stop.take());
-        if let Some(thread) = self.thread.take() {
-            let _ = thread.join();
-        }
+        let _ = self.thread.take().map(JoinHandle::join);
     }
 }
 
-async fn serve(
-    listener: TcpListener,
-    units: Arc<Units>,
-    stopped: tokio::sync::oneshot::Receiver<()>,
-) -> io::Result<()> {
+async fn serve(listener: TcpListener, units: Arc<Units>, stopped: oneshot::Receiver<()>) -> io::Result<()> {
     let server = Server::new(tokio::net::TcpListener::from_std(listener)?);
     let places = Arc::new(Places::default());
     let plant = units.plant.clone();

@@ -11,6 +11,9 @@ use std::sync::Arc;
 use std::sync::atomic::{AtomicBool, Ordering};
 use std::time::Duration;
 
+/// The emulator's end of a serial line.
+pub type Port = Box<dyn serialport::SerialPort>;
+
 /// An emulator on a serial line; dropping it stops it.
 pub struct SerialEmulator {
     _thread: Service,
@@ -23,7 +26,7 @@ impl SerialEmulator {
     /// # Errors
     /// Where no thread can be had.
     pub fn start(
-        mut port: Box<dyn serialport::SerialPort>,
+        mut port: Port,
         mut turn: impl FnMut(&[u8]) -> Vec<u8> + Send + 'static,
     ) -> io::Result<Self> {
         let work = move |stopped: Arc<AtomicBool>| {
@@ -51,11 +54,7 @@ impl SerialEmulator {
     ///
     /// # Errors
     /// Where no thread can be had.
-    pub fn modbus_rtu(
-        port: Box<dyn serialport::SerialPort>,
-        devices: BTreeMap<u8, Device>,
-        plant: SharedPlant,
-    ) -> io::Result<Self> {
+    pub fn modbus_rtu(port: Port, devices: BTreeMap<u8, Device>, plant: SharedPlant) -> io::Result<Self> {
         let mut line = RtuLine {
             devices,
             plant,
@@ -72,19 +71,11 @@ impl SerialEmulator {
     ///
     /// # Errors
     /// Where no thread can be had, or the profile has no stream.
-    pub fn stream(
-        port: Box<dyn serialport::SerialPort>,
-        mut device: Device,
-        plant: SharedPlant,
-    ) -> io::Result<Self> {
+    pub fn stream(port: Port, mut device: Device, plant: SharedPlant) -> io::Result<Self> {
         let stream = device.profile().description.stream.clone();
         let stream = stream.ok_or_else(|| io::Error::other("the profile has no stream"))?;
         let mut due = plant.now().1;
-        Self::start(port, move |_| {
-            let (sent, next) = frames(&mut device, &stream, &plant, due);
-            due = next;
-            sent.concat()
-        })
+        Self::start(port, move |_| frames(&mut device, &stream, &plant, &mut due).concat())
     }
 }
 
@@ -146,10 +137,9 @@ impl RtuLine {
             Operation::Read { function, address, count } => {
                 let mut tables = [Table::Coil, Table::Discrete, Table::Holding].into_iter();
                 let table = tables.find(|table| table.read_function() == function).unwrap_or(Table::Input);
-                match device.read(table, address, count.min(125), &mut *plant, now) {
-                    Ok(registers) => rtu::give(unit, function, &registers),
-                    Err(refused) => rtu::refuse(unit, function, code(refused)),
-                }
+                let read = device.read(table, address, count.min(125), &mut *plant, now);
+                let refused = |why| rtu::refuse(unit, function, code(why));
+                read.map_or_else(refused, |registers| rtu::give(unit, function, &registers))
             }
             Operation::Write { function, address, registers } => {
                 let second =
@@ -165,10 +155,9 @@ impl RtuLine {
                     return rtu::refuse(unit, function, ILLEGAL_FUNCTION);
                 }
                 let table = if function == 15 { Table::Coil } else { Table::Holding };
-                match device.write(table, address, &registers, &mut *plant) {
-                    Ok(()) => rtu::confirm(unit, function, address, second),
-                    Err(refused) => rtu::refuse(unit, function, code(refused)),
-                }
+                let written = device.write(table, address, &registers, &mut *plant);
+                let refused = |why| rtu::refuse(unit, function, code(why));
+                written.map_or_else(refused, |()| rtu::confirm(unit, function, address, second))
             }
             Operation::Custom { function, data } => {
                 if stream.and_then(|s| s.start_function) == Some((function, data)) {
@@ -184,7 +173,7 @@ impl RtuLine {
     }
 
     /// A streaming unit sends frames and hears only the bytes that stop it.
-    fn stream(&mut self, unit: u8, due: Nanos, bytes: &[u8]) -> Vec<u8> {
+    fn stream(&mut self, unit: u8, mut due: Nanos, bytes: &[u8]) -> Vec<u8> {
         let Some(device) = self.devices.get_mut(&unit) else { return Vec::new() };
         let Some(stream) = device.profile().description.stream.clone() else { return Vec::new() };
         let stop = stream.stop.map(|(stop, _)| stop);
@@ -196,29 +185,29 @@ impl RtuLine {
             self.heard.clear();
             return Vec::new();
         }
-        let (sent, due) = frames(device, &stream, &self.plant, due);
+        let sent = frames(device, &stream, &self.plant, &mut due);
         self.streaming = Some((unit, due));
         sent.concat()
     }
 }
 
-/// The frames of a stream that are due, and when the next is.
+/// The frames of a stream that are due; `due` goes on to the next one.
 pub(super) fn frames(
     device: &mut Device,
     stream: &Stream,
     plant: &SharedPlant,
-    due: Nanos,
-) -> (Vec<Vec<u8>>, Nanos) {
+    due: &mut Nanos,
+) -> Vec<Vec<u8>> {
     let (mut plant, now) = plant.as_left();
-    let Some(frame) = device.profile().frame("stream") else { return (Vec::new(), due) };
+    let Some(frame) = device.profile().frame("stream") else { return Vec::new() };
     let end = device.profile().description.link.rx_end().to_owned();
     let period = Nanos::from_seconds(1.0 / stream.rate_hz).0.max(1);
     // A thread that was held up for long leaves samples out, as the instrument's own buffer would.
-    let mut due = Nanos(due.0 + (now.since(due).0 / period).saturating_sub(FRAMES_A_TURN) * period);
+    *due = Nanos(due.0 + (now.since(*due).0 / period).saturating_sub(FRAMES_A_TURN) * period);
     let mut sent = Vec::new();
-    while due <= now {
-        plant.advance(due);
-        let mut bytes = device.frame(frame, &mut *plant, due);
+    while *due <= now {
+        plant.advance(*due);
+        let mut bytes = device.frame(frame, &mut *plant, *due);
         match device.profile().frames()[frame.0].write_line(&bytes, 1.0) {
             Some(line) => sent.push([line, end.clone()].concat().into_bytes()),
             None => {
@@ -226,9 +215,9 @@ pub(super) fn frames(
                 sent.push(bytes);
             }
         }
-        due = Nanos(due.0 + period);
+        *due = Nanos(due.0 + period);
     }
-    (sent, due)
+    sent
 }
 
 /// Puts sync bytes and check into a stream's frame.

@@ -63,8 +63,7 @@ impl NetworkStream {
 fn serve(mut ears: Ears, mut device: Device, stream: &Stream, plant: &SharedPlant, stopped: &AtomicBool) {
     let mut due = plant.now().1;
     while !stopped.load(Ordering::Acquire) {
-        let (sent, next) = frames(&mut device, stream, plant, due);
-        due = next;
+        let sent = frames(&mut device, stream, plant, &mut due);
         match &mut ears {
             Ears::Tcp(listener, clients) => {
                 if let (Ok((client, _)), true) = (listener.accept(), clients.len() < MOST_CLIENTS) {
