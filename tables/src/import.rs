@@ -160,12 +160,10 @@ const PADDING: &str = "zeros at the end: room that was not filled";
 impl Import<'_> {
     fn table(&self, notes: &mut Vec<String>) -> miette::Result<Table> {
         let Import { source, grid, wanted, .. } = *self;
-        let maps = self.maps(notes)?;
-        let clocks = self.clocks(notes)?;
         let full = grid.rows.iter().rposition(|r| !is_padding(r)).map_or(0, |k| k + 1);
         let padded = grid.rows.len() - full;
         let room_from = if wanted.padding { full } else { grid.rows.len() };
-        let (mut values, mut dropped) = self.rows(&maps, &clocks, room_from);
+        let (mut values, mut dropped) = self.rows(notes, room_from)?;
         let is_row = |d: &&Dropped| d.reason != PADDING && d.reason != head::ONE_TEXT;
         let mut of = (values.len() + dropped.iter().filter(is_row).count(), "rows");
         let (mut series, mut spreads) = (None, Vec::new());
@@ -200,10 +198,11 @@ impl Import<'_> {
         Ok(Table { passes, dropped, series })
     }
 
-    /// The times of the rows where a clock gives them; none otherwise.
+    /// The times of the rows where a clock, or their number, gives them; none otherwise.
     fn clocks(&self, notes: &mut Vec<String>) -> miette::Result<Vec<Option<f64>>> {
         if self.map.time_by_rows {
             notes.push("time_s is the number of the row, a second each".into());
+            return Ok((0..self.grid.rows.len()).map(|number| Some(number as f64)).collect());
         }
         let column = self.map.columns.iter().find(|c| c.target.id == Id::Time);
         let read = column.map(|c| clock::times(self.grid, c.index, &c.unit_text)).transpose();
@@ -229,12 +228,8 @@ impl Import<'_> {
     }
 
     /// The values of the rows, and the rows that are left out. Those from number `room_from` on are padding.
-    fn rows(
-        &self,
-        maps: &[Option<Map>],
-        clocks: &[Option<f64>],
-        room_from: usize,
-    ) -> (Vec<Values>, Vec<Dropped>) {
+    fn rows(&self, notes: &mut Vec<String>, room_from: usize) -> miette::Result<(Vec<Values>, Vec<Dropped>)> {
+        let (maps, clocks) = (self.maps(notes)?, self.clocks(notes)?);
         let (mut values, mut dropped) = (Vec::new(), self.grid.left_out.clone());
         for (number, row) in self.grid.rows.iter().enumerate() {
             let Some(map) = &maps[row.block] else { continue };
@@ -243,12 +238,12 @@ impl Import<'_> {
                 dropped.push(Dropped { row: row.place, column: String::new(), text, reason });
                 continue;
             }
-            match Values::read(self.grid, map, row, number, clocks.get(number).copied().flatten()) {
+            match Values::read(self.grid, map, row, clocks.get(number).copied().flatten()) {
                 Ok(v) => values.push(v),
                 Err(why) => dropped.push(why),
             }
         }
-        (values, dropped)
+        Ok((values, dropped))
     }
 }
 

@@ -108,11 +108,8 @@ fn cases(path: &Path) -> miette::Result<()> {
 fn campaign(path: &Path) -> miette::Result<usize> {
     let mut passes = 0;
     let mut problems = Vec::new();
-    let sessions = path.join("sessions");
-    let mut runs: Vec<_> = match std::fs::read_dir(&sessions) {
-        Ok(found) => found.filter_map(|entry| entry.ok().map(|e| e.path())).collect(),
-        Err(_) => Vec::new(),
-    };
+    let found = std::fs::read_dir(path.join("sessions")).into_iter().flatten().flatten();
+    let mut runs: Vec<_> = found.map(|entry| entry.path()).collect();
     runs.sort();
     for run in runs.iter().filter(|run| run.is_dir()) {
         match super::written::run_folder(run) {

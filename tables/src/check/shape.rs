@@ -6,13 +6,13 @@ use runs::input::{Problems, in_si, unit_of};
 use serde_json::{Map, Value};
 use std::ops::Range;
 use toml::de::DeTable;
-use tree::{Entry, Is, Node, entries, types};
+use tree::{Entry, Is, Node, Place, entries, types};
 
 mod nearest;
 mod tree;
 
 struct Wrong {
-    place: Option<Range<usize>>,
+    place: Place,
     problem: String,
     remedy: Option<String>,
     /// What makes the rest readable: these bytes replaced by that.
@@ -139,14 +139,7 @@ fn mistyped(schema: &Value, Node { is, span }: &Node, path: &str) -> Wrong {
     Wrong { place: span.clone(), problem, remedy, mend: span.clone().zip(number) }
 }
 
-fn object(
-    root: &Value,
-    schema: &Value,
-    entries: &[Entry],
-    path: &str,
-    place: Option<Range<usize>>,
-    wrong: &mut Vec<Wrong>,
-) {
+fn object(root: &Value, schema: &Value, entries: &[Entry], path: &str, place: Place, wrong: &mut Vec<Wrong>) {
     let none = Map::new();
     let properties = schema["properties"].as_object().unwrap_or(&none);
     let known: Vec<&str> = properties.keys().map(String::as_str).collect();

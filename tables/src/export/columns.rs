@@ -2,6 +2,7 @@
 
 use super::unit;
 use models::covariate::{self, Covariate};
+use realtime::compare::PassComparison;
 use runs::sequence::MeasuredPass;
 
 /// The cells of a column: numbers or text, missing values as `None`.
@@ -64,6 +65,8 @@ pub fn of(passes: &[MeasuredPass]) -> Table {
     let texts = |name, words, f: &dyn Fn(&MeasuredPass) -> Option<String>| {
         column(name, words, Cells::Texts(passes.iter().map(f).collect()))
     };
+    let compared =
+        |name, words, f: &dyn Fn(PassComparison) -> Option<f64>| numbers(name, words, &|p| f(p.comparison?));
     let covariate = |c: &&'static Covariate| numbers(c.name, c.words, &|p| c.of(&p.pass.condition(1.0)));
     let mut table = vec![counts("point", "number of the point in the plan", &|p| Some(p.pass.point))];
     table.extend(covariate::REQUIRED.iter().map(covariate));
@@ -87,24 +90,16 @@ pub fn of(passes: &[MeasuredPass]) -> Table {
         counts("replicate", "repeat of the condition", &|p| p.pass.replicate),
         texts("run", "name of the run, in tables of several", &|p| p.pass.run.clone()),
         counts("session", "session of the run, from 1", &|p| p.pass.session),
-        numbers("mu_relative", "relative friction mu' = mu / mu_0, measured", &|p| {
-            p.comparison.and_then(|c| c.mu_relative)
+        compared("mu_relative", "relative friction mu' = mu / mu_0, measured", &|c| c.mu_relative),
+        compared("mu_relative_sd", "standard uncertainty of the measured mu'", &|c| c.mu_relative_sd),
+        compared("mu_relative_predicted", "mu' that the model predicts at the measured condition", &|c| {
+            Some(c.predicted)
         }),
-        numbers("mu_relative_sd", "standard uncertainty of the measured mu'", &|p| {
-            p.comparison.and_then(|c| c.mu_relative_sd)
+        compared("mu_relative_predicted_sd", "standard uncertainty of the predicted mu'", &|c| {
+            Some(c.predicted_sd)
         }),
-        numbers("mu_relative_predicted", "mu' that the model predicts at the measured condition", &|p| {
-            p.comparison.map(|c| c.predicted)
-        }),
-        numbers("mu_relative_predicted_sd", "standard uncertainty of the predicted mu'", &|p| {
-            p.comparison.map(|c| c.predicted_sd)
-        }),
-        numbers("residual_z", "measured less predicted, in standard deviations", &|p| {
-            p.comparison.map(|c| c.z)
-        }),
-        numbers("log_evidence", "ln of the evidence against the model so far", &|p| {
-            p.comparison.map(|c| c.log_evidence)
-        }),
+        compared("residual_z", "measured less predicted, in standard deviations", &|c| Some(c.z)),
+        compared("log_evidence", "ln of the evidence against the model so far", &|c| Some(c.log_evidence)),
         numbers("psi_eq17", "Psi of Eq. 17 at the measured condition", &|p| p.psi_eq17),
     ]);
     table

@@ -20,16 +20,18 @@ pub struct Array {
     pub units: Vec<String>,
 }
 
-/// What is in a file besides: what could not be read, by its kind, and short texts by name.
+/// What is in a file: arrays, what could not be read, by its kind, and short texts by name.
 #[derive(Clone, Debug, Default)]
-pub struct Beside {
+pub struct Contents {
+    /// Arrays.
+    pub arrays: Vec<Array>,
     /// Sentences.
     pub notes: Vec<String>,
     /// Texts.
     pub texts: BTreeMap<String, String>,
 }
 
-impl Beside {
+impl Contents {
     /// The unit that a text beside an array states: `Fn.data` with `Fn.unit`, `Fn` with `units.Fn`.
     fn unit(&self, name: &str) -> Option<&String> {
         let (around, own) = name.rsplit_once('.').map_or(("", name), |(around, own)| (around, own));
@@ -48,24 +50,13 @@ impl Beside {
 ///
 /// # Errors
 /// No arrays, several lengths that are as common, a name that is not there.
-pub fn table(
-    format: &str,
-    arrays: Vec<Array>,
-    of: Option<&str>,
-    wanted: &[String],
-    beside: Beside,
-) -> miette::Result<Grid> {
-    let chosen = |array: &Array| match of {
-        None => true,
-        Some(name) => {
-            let rest = array.name.strip_prefix(name);
-            rest.is_some_and(|rest| rest.is_empty() || rest.starts_with(['.', '/']))
-        }
-    };
+pub fn table(format: &str, of: Option<&str>, wanted: &[String], mut found: Contents) -> miette::Result<Grid> {
+    let within = |rest: &str| rest.is_empty() || rest.starts_with(['.', '/']);
+    let chosen = |array: &Array| of.is_none_or(|of| array.name.strip_prefix(of).is_some_and(within));
     let listed = |a: &Array| format!("{} ({} x {})", a.name, a.rows, a.columns);
-    let all: Vec<String> = arrays.iter().map(listed).collect();
+    let all: Vec<String> = found.arrays.iter().map(listed).collect();
     let (mut constants, mut by_length) = (Vec::new(), BTreeMap::<usize, Vec<Array>>::new());
-    for mut array in arrays.into_iter().filter(chosen) {
+    for mut array in std::mem::take(&mut found.arrays).into_iter().filter(chosen) {
         if array.cells.len() == 1 {
             constants.push(format!("{} = {}", array.name, array.cells[0].shown()));
             continue;
@@ -84,7 +75,7 @@ pub fn table(
     let (Some(length), None) = (first.next(), first.next()) else {
         let listed = if all.is_empty() { "none".to_string() } else { all.join(", ") };
         let why =
-            if beside.notes.is_empty() { String::new() } else { format!("\n{}", beside.notes.join("\n")) };
+            if found.notes.is_empty() { String::new() } else { format!("\n{}", found.notes.join("\n")) };
         miette::bail!(
             help = format!("name an array, a structure or a group with --sheet; arrays of numbers: {listed}"),
             "the {format} file holds no table: its arrays have several lengths, or there is none of that name{why}"
@@ -105,7 +96,7 @@ pub fn table(
             (n, true) => header.extend((1..=n).map(|k| format!("#{k}"))),
             (n, false) => header.extend((1..=n).map(|k| format!("{name}#{k}"))),
         }
-        let one = beside.unit(&array.name).cloned().unwrap_or_default();
+        let one = found.unit(&array.name).cloned().unwrap_or_default();
         units.extend((0..array.columns).map(|k| array.units.get(k).cloned().unwrap_or(one.clone())));
     }
     let within = header[0].rsplit_once('/').map(|(group, _)| format!("{group}/")).unwrap_or_default();
@@ -121,7 +112,7 @@ pub fn table(
         Row::new(row as u64 + 1, columns.iter().flat_map(of_array).collect())
     };
     grid = Grid { format: format.into(), header, units, rows: (0..rows).map(row).collect(), ..grid };
-    grid.notes.extend(beside.notes);
+    grid.notes.extend(found.notes);
     if !rest.is_empty() {
         grid.notes.push(format!("arrays of another length were passed over: {}", rest.join(", ")));
     }

@@ -1,6 +1,6 @@
 //! HDF5 files, MAT files of version 7.3 among them: numeric datasets of one or two dimensions, in groups too.
 
-use super::arrays::{Array, Beside, table};
+use super::arrays::{Array, Contents, table};
 use super::grid::{Cell, Grid};
 use hdf5_pure::{AttrValue, DType, Dataset, Error, File, Group, VlenStringReadOptions};
 use std::collections::HashMap;
@@ -21,18 +21,16 @@ pub fn read(bytes: &[u8], sheet: Option<&str>, wanted: &[String]) -> miette::Res
         )
     };
     let file = File::from_bytes(bytes.to_vec()).map_err(wrong)?;
-    let mut found =
-        Found { matlab, most: super::most_cells(bytes.len()), arrays: Vec::new(), beside: Beside::default() };
+    let mut found = Found { matlab, most: super::most_cells(bytes.len()), contents: Contents::default() };
     found.walk(&file.root(), "", 0).map_err(wrong)?;
-    table(if matlab { "MAT 7.3" } else { "HDF5" }, found.arrays, sheet, wanted, found.beside)
+    table(if matlab { "MAT 7.3" } else { "HDF5" }, sheet, wanted, found.contents)
 }
 
 struct Found {
     matlab: bool,
     /// Cells that may still be read.
     most: usize,
-    arrays: Vec<Array>,
-    beside: Beside,
+    contents: Contents,
 }
 
 fn texts(value: &AttrValue) -> Vec<String> {
@@ -67,9 +65,9 @@ impl Found {
             let dataset = group.dataset(&name)?;
             match self.array(&dataset, inside(&name)) {
                 Ok(None) => {}
-                Ok(Some(why)) => self.beside.notes.push(why),
+                Ok(Some(why)) => self.contents.notes.push(why),
                 // One that cannot be read costs no more than itself.
-                Err(error) => self.beside.notes.push(format!("{} was passed over: {error}", inside(&name))),
+                Err(error) => self.contents.notes.push(format!("{} was passed over: {error}", inside(&name))),
             }
         }
         // What MATLAB refers to from its cells.
@@ -140,7 +138,7 @@ impl Found {
         let units = for_columns(&about, &["units", "unit"], columns);
         let names = ["columns", "column_names", "names", "header", "labels", "channels", "fields"];
         let names = if columns > 1 { for_columns(&about, &names, columns) } else { Vec::new() };
-        self.arrays.push(Array { name, rows, columns, cells: by_columns, names, units });
+        self.contents.arrays.push(Array { name, rows, columns, cells: by_columns, names, units });
         Ok(None)
     }
 }

@@ -1,7 +1,7 @@
 //! MAT files of version 5 (the form that MATLAB writes with `-v7` and `-v6`, and scipy.io.savemat): numeric
 //! arrays, also within structures. 'MAT-File Format', The MathWorks, chapter 1. Version 7.3 is HDF5.
 
-use super::arrays::{Array, Beside, table};
+use super::arrays::{Array, Contents, table};
 use super::grid::{Cell, Grid};
 use flate2::read::ZlibDecoder;
 use std::io::Read;
@@ -29,7 +29,7 @@ pub fn read(bytes: &[u8], sheet: Option<&str>, wanted: &[String]) -> miette::Res
         Some(b"MI") => true,
         _ => return Err(cut()),
     };
-    let (mut arrays, mut beside) = (Vec::new(), Beside::default());
+    let mut found = Contents::default();
     // What all compressed arrays together may unfold to: a number has eight bytes at most.
     let mut most = 8 * super::most_cells(bytes.len());
     let mut rest = &bytes[128..];
@@ -48,14 +48,14 @@ pub fn read(bytes: &[u8], sheet: Option<&str>, wanted: &[String]) -> miette::Res
         let element =
             if unfolded.is_empty() { element } else { Element::next(&mut inside, big).ok_or_else(cut)? };
         if element.kind == MATRIX {
-            matrix(element.data, big, "", 0, &mut arrays, &mut beside).ok_or_else(cut)?;
-            let cells: usize = arrays.iter().map(|a| a.cells.len()).sum();
+            matrix(element.data, big, "", 0, &mut found).ok_or_else(cut)?;
+            let cells: usize = found.arrays.iter().map(|a| a.cells.len()).sum();
             if cells > super::most_cells(bytes.len()) {
                 return Err(super::too_many("the MAT file", cells, bytes.len()));
             }
         }
     }
-    table("MAT", arrays, sheet, wanted, beside)
+    table("MAT", sheet, wanted, found)
 }
 
 /// A piece of data with its type.
@@ -129,14 +129,7 @@ impl<'a> Element<'a> {
 }
 
 /// Takes the arrays out of a matrix; `None` where it is cut.
-fn matrix(
-    mut rest: &[u8],
-    big: bool,
-    around: &str,
-    depth: usize,
-    arrays: &mut Vec<Array>,
-    beside: &mut Beside,
-) -> Option<()> {
+fn matrix(mut rest: &[u8], big: bool, around: &str, depth: usize, found: &mut Contents) -> Option<()> {
     if rest.is_empty() {
         return Some(());
     }
@@ -146,7 +139,7 @@ fn matrix(
         let name = Element::next(&mut rest, big)?.text();
         let kind = Element::next(&mut rest, big).and_then(|_| Element::next(&mut rest, big));
         let kind = kind.map(|e| e.text()).unwrap_or_default();
-        beside.notes.push(unread(&name, &kind, ""));
+        found.notes.push(unread(&name, &kind, ""));
         return Some(());
     }
     let sizes = Element::next(&mut rest, big)?;
@@ -166,7 +159,7 @@ fn matrix(
             for field in names.chunks_exact(width.max(1)) {
                 let field = String::from_utf8_lossy(field.split(|b| *b == 0).next()?).into_owned();
                 let element = Element::next(&mut rest, big)?;
-                matrix(element.data, big, &format!("{name}.{field}"), depth + 1, arrays, beside)?;
+                matrix(element.data, big, &format!("{name}.{field}"), depth + 1, found)?;
             }
         }
         6..=15 if sizes.len() == 2 && marks & COMPLEX == 0 => {
@@ -177,16 +170,17 @@ fn matrix(
             let name = name.trim_start_matches('.').to_string();
             // What objects refer to has no name.
             if count > 0 && !name.is_empty() {
-                arrays.push(Array { name, rows: sizes[0], columns: sizes[1], cells, ..Array::default() });
+                let (rows, columns) = (sizes[0], sizes[1]);
+                found.arrays.push(Array { name, rows, columns, cells, ..Array::default() });
             }
         }
         CHARACTERS => {
             let text = Element::next(&mut rest, big)?;
             let short = count <= 64 && sizes.first() == Some(&1);
             if let (true, Some(cells)) = (short, text.codes(big)) {
-                beside.texts.insert(name.clone(), cells);
+                found.texts.insert(name.clone(), cells);
             }
-            beside.notes.push(format!("{name} is text: passed over"));
+            found.notes.push(format!("{name} is text: passed over"));
         }
         _ => {
             let kind = match class {
@@ -200,7 +194,7 @@ fn matrix(
                 _ => "unknown",
             };
             let size = sizes.iter().map(ToString::to_string).collect::<Vec<_>>().join(" x ");
-            beside.notes.push(unread(&name, kind, &size));
+            found.notes.push(unread(&name, kind, &size));
         }
     }
     Some(())

@@ -71,17 +71,11 @@ impl Values {
         Some(self.numbers[id as usize]).filter(|v| !v.is_nan())
     }
 
-    /// Reads a row. `number` is its place among the data, `clock` its time where a clock says it.
+    /// Reads a row. `clock` is its time where a clock, or its number, says it.
     ///
     /// # Errors
     /// The first cell that cannot be read.
-    pub fn read(
-        grid: &Grid,
-        map: &Map,
-        row: &Row,
-        number: usize,
-        clock: Option<f64>,
-    ) -> Result<Self, Dropped> {
+    pub fn read(grid: &Grid, map: &Map, row: &Row, clock: Option<f64>) -> Result<Self, Dropped> {
         let mut values = Values { place: row.place, numbers: [f64::NAN; COUNT], run: None };
         for constant in &map.constants {
             if constant.target.kind == ColumnKind::Text {
@@ -90,8 +84,8 @@ impl Values {
                 values.numbers[constant.target.id as usize] = constant.value;
             }
         }
-        if map.time_by_rows {
-            values.numbers[Id::Time as usize] = number as f64;
+        if let Some(time) = clock {
+            values.numbers[Id::Time as usize] = time;
         }
         for column in &map.columns {
             let Some(cell) = row.cells.get(column.index).filter(|c| **c != Cell::Empty) else { continue };

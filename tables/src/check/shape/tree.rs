@@ -5,10 +5,13 @@ use std::ops::Range;
 use toml::Spanned;
 use toml::de::{DeTable, DeValue};
 
-/// A value of a file, and its place; JSON has none.
+/// A place in a text; a JSON document has none.
+pub type Place = Option<Range<usize>>;
+
+/// A value of a file, and its place.
 pub struct Node {
     pub is: Is,
-    pub span: Option<Range<usize>>,
+    pub span: Place,
 }
 
 /// What a value is, whatever the language.
@@ -24,7 +27,7 @@ pub enum Is {
 }
 
 /// A key of a table, its place, and its value.
-pub type Entry = (String, Option<Range<usize>>, Node);
+pub type Entry = (String, Place, Node);
 
 impl Node {
     fn toml(value: &Spanned<DeValue<'_>>) -> Self {
