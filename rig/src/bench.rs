@@ -20,22 +20,17 @@ impl Bench for AtTheBench {
         live::table(setup, table)
     }
 
+    /// The settings of the vibrometer's controller, read back now; they must cover the drive's frequency.
     fn vibrometer(&self, setup: &Setup, frequency_hz: f64) -> miette::Result<Settings> {
-        vibrometer(setup, frequency_hz)
+        let Some(vibrometer) = &setup.file.vibrometer else {
+            miette::bail!(
+                help = "[vibrometer] profile = \"polytec-ofv5000\", address = \"/dev/ttyS0\", decoder = \"VD-02\"",
+                "{}: the setup names no vibrometer",
+                setup.origin
+            );
+        };
+        let settings = drivers::vibrometer::settings(vibrometer).map_err(|e| miette::miette!("{e}"))?;
+        settings.covers(frequency_hz).map_err(|e| miette::miette!("{e}"))?;
+        Ok(settings)
     }
-}
-
-/// The settings of the vibrometer's controller, read back now; they must cover the drive's frequency.
-fn vibrometer(setup: &Setup, frequency_hz: f64) -> miette::Result<Settings> {
-    let Some(vibrometer) = &setup.file.vibrometer else {
-        miette::bail!(
-            help =
-                "[vibrometer] profile = \"polytec-ofv5000\", address = \"/dev/ttyS0\", decoder = \"VD-02\"",
-            "{}: the setup names no vibrometer",
-            setup.origin
-        );
-    };
-    let settings = drivers::vibrometer::settings(vibrometer).map_err(|e| miette::miette!("{e}"))?;
-    settings.covers(frequency_hz).map_err(|e| miette::miette!("{e}"))?;
-    Ok(settings)
 }

@@ -218,17 +218,12 @@ pub fn look(setup: &Setup, instruments: &InstrumentsSetup) -> Look {
             Ok(_) => reports(&mut followed, &o, &last, &setup.config.limits.timing, seconds),
             Err(_) => Vec::new(),
         },
-        answers: o.link.map(|_link| answers(o.instrument, before, after, seconds)),
+        answers: o.link.map(|_link| answers(o.instrument, [before, after], seconds)),
     });
     Look { found: found.collect(), seen: last, blocking: rules.worst().filter(|_| whole), stalls }
 }
 
-fn answers(
-    instrument: &InstrumentSetup,
-    before: &HealthReport,
-    after: &HealthReport,
-    seconds: f64,
-) -> Answers {
+fn answers(instrument: &InstrumentSetup, [before, after]: [&HealthReport; 2], seconds: f64) -> Answers {
     let bad = |h: &HealthReport| h.corrupt_frames + h.timeouts + h.exceptions;
     let (samples, repeats) = (after.samples - before.samples, after.repeats - before.repeats);
     let wrong = bad(after) - bad(before);

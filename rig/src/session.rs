@@ -36,8 +36,7 @@ use writer::{Entry, Recording};
 ///
 /// # Errors
 /// Whatever prevents it before anything was commanded (a refusal), or a fault of this program.
-pub fn run(job: Job, signals: &Signals, update: &mut dyn FnMut(Update<'_>)) -> miette::Result<Summary> {
-    let mut job = job;
+pub fn run(mut job: Job, signals: &Signals, update: &mut dyn FnMut(Update<'_>)) -> miette::Result<Summary> {
     // The loop's thread is in no span: nothing there formats. Threads that write log lines of the session
     // enter it.
     let _session = tracing::warn_span!("session", run = %job.out.display()).entered();

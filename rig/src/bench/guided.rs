@@ -166,7 +166,7 @@ fn read(rig: &mut Rig, epoch: Instant, way: &SeriesOptions<'_>) -> Result<Taken,
             Err(Missing::Other(why)) => return Err(why),
             Err(Missing::Link(why)) => why,
         };
-        if !down {
+        if !std::mem::replace(&mut down, true) {
             let links = rig.links.health().map(|(name, health)| format!("{name}: {}", health.last_problem));
             say!(
                 "  {why} ({}): waiting up to {:.0} s for it to come back; nothing that was weighed is lost",
@@ -174,7 +174,6 @@ fn read(rig: &mut Rig, epoch: Instant, way: &SeriesOptions<'_>) -> Result<Taken,
                 way.reconnect_s
             );
         }
-        down = true;
         loop {
             if begun.elapsed().as_secs_f64() > way.reconnect_s {
                 return Err(format!("{why}, and did not come back within {:.0} s", way.reconnect_s));

@@ -7,11 +7,12 @@
 
 mod drive;
 
+use super::AtTheBench;
 use crate::rig_lock::RigLock;
 use drive::Drive;
 use drivers::vibrometer::Settings;
 use models::quantity::PeakToPeak;
-use runs::calibrate::{LiveTable, displacement};
+use runs::calibrate::{Bench, LiveTable, displacement};
 use runs::session::Unfinished;
 use runs::setup::Setup;
 use runs::{ask, say};
@@ -30,7 +31,7 @@ const LOOK_EVERY: Duration = Duration::from_millis(20);
 /// limits, an input that ends early, settings that were changed meanwhile.
 pub fn table(setup: &Setup, table: &LiveTable<'_>) -> miette::Result<String> {
     check(setup, table)?;
-    let settings = super::vibrometer(setup, table.frequency_hz)?;
+    let settings = AtTheBench.vibrometer(setup, table.frequency_hz)?;
     say!("vibrometer: {settings}");
     let _claim = RigLock::take(setup)?;
     let drive = Drive::start(setup)?;
@@ -45,7 +46,7 @@ pub fn table(setup: &Setup, table: &LiveTable<'_>) -> miette::Result<String> {
         Err(why) if !off.read_back => return Err(why.wrap_err(Unfinished::NotOff)),
         taken => taken?,
     };
-    let after = super::vibrometer(setup, table.frequency_hz)?;
+    let after = AtTheBench.vibrometer(setup, table.frequency_hz)?;
     if after != settings {
         miette::bail!("the vibrometer was set otherwise while the table was taken ({after} now): no table");
     }

@@ -30,7 +30,10 @@ const POLICY: &str = "default-src 'none'; script-src 'self'; style-src 'self' 'u
                       connect-src 'self'; frame-src 'self'; base-uri 'none'; form-action 'none'; frame-ancestors 'none'";
 
 /// What a handler has of the server.
-type Server = State<Arc<Shared>>;
+pub type Server = State<Arc<Shared>>;
+/// What it answers: with a text or a document, or by a status alone.
+type Answer = Result<Response, Response>;
+type Done = Result<StatusCode, Response>;
 
 /// The addresses.
 pub fn routes(shared: Arc<Shared>) -> Router {
@@ -132,7 +135,7 @@ async fn about(State(shared): Server) -> Response {
     Json(serde_json::json!({ "version": version, "control": shared.options.control })).into_response()
 }
 
-async fn runs(State(shared): Server) -> Result<Response, Response> {
+async fn runs(State(shared): Server) -> Answer {
     let found = beside(move || pages::runs(&shared.options.runs)).await?;
     Ok(found.map_or_else(|why| failed_to(&why), |runs| Json(runs).into_response()))
 }
@@ -142,7 +145,7 @@ fn folder(shared: &Shared, name: &str) -> Result<std::path::PathBuf, Response> {
     shared.folder(name).ok_or_else(|| StatusCode::NOT_FOUND.into_response())
 }
 
-async fn run(State(shared): Server, Path(name): Path<String>) -> Result<Response, Response> {
+async fn run(State(shared): Server, Path(name): Path<String>) -> Answer {
     folder(&shared, &name)?;
     let (diagnosing, failed) = {
         let diagnoses = shared.diagnoses.lock().unwrap_or_else(PoisonError::into_inner);
@@ -153,7 +156,7 @@ async fn run(State(shared): Server, Path(name): Path<String>) -> Result<Response
     Ok(found.map_or_else(|why| failed_to(&why), |run| Json(answer(run)).into_response()))
 }
 
-async fn report(State(shared): Server, Path(name): Path<String>) -> Result<Response, Response> {
+async fn report(State(shared): Server, Path(name): Path<String>) -> Answer {
     let folder = folder(&shared, &name)?;
     let found = beside(move || runs::report::html(&folder)).await?;
     Ok(found.map_or_else(|why| failed_to(&why), html))
@@ -169,11 +172,8 @@ struct WindowS {
 
 /// The recorded cycles of a window, as finely as a screen shows them. One window is read at a time: the
 /// record of hours is long.
-async fn cycles(
-    State(shared): Server,
-    Path(name): Path<String>,
-    Query(WindowS { from_s, to_s }): Query<WindowS>,
-) -> Result<Response, Response> {
+async fn cycles(State(shared): Server, Path(name): Path<String>, Query(window): Query<WindowS>) -> Answer {
+    let WindowS { from_s, to_s } = window;
     let folder = folder(&shared, &name)?;
     if !(0.0..=LONGEST_LOOP_S).contains(&from_s) || !(from_s..=LONGEST_LOOP_S).contains(&to_s) {
         let why = "a window from from_s to to_s is needed, in s of loop time, the first not after the second";
@@ -185,29 +185,22 @@ async fn cycles(
     Ok(found.map_or_else(|why| failed_to(&why), |window| Json(window).into_response()))
 }
 
-async fn file(
-    State(shared): Server,
-    Path((name, file)): Path<(String, String)>,
-) -> Result<Response, Response> {
+async fn file(State(shared): Server, Path((name, file)): Path<(String, String)>) -> Answer {
     let folder = folder(&shared, &name)?;
     let found = beside(move || download::file(&folder, &file)).await?;
     found.ok_or_else(|| StatusCode::NOT_FOUND.into_response())
 }
 
-async fn annotate(
-    State(shared): Server,
-    Path(name): Path<String>,
-    Json(annotations): Json<Annotations>,
-) -> Result<StatusCode, Response> {
+async fn annotate(State(shared): Server, Path(name): Path<String>, Json(new): Json<Annotations>) -> Done {
     shared.guard.count().map_err(IntoResponse::into_response)?;
     let folder = folder(&shared, &name)?;
-    beside(move || annotations.write(&folder)).await?.map_err(|why| failed_to(&why))?;
+    beside(move || new.write(&folder)).await?.map_err(|why| failed_to(&why))?;
     Ok(StatusCode::NO_CONTENT)
 }
 
 /// Begins a diagnosis beside everything else. While any run of the folder goes on there is none: it
 /// would take that loop's processor.
-async fn diagnose(State(shared): Server, Path(name): Path<String>) -> Result<StatusCode, Response> {
+async fn diagnose(State(shared): Server, Path(name): Path<String>) -> Done {
     shared.guard.count().map_err(IntoResponse::into_response)?;
     let folder = folder(&shared, &name)?;
     let refused = |why: &str| (StatusCode::CONFLICT, why.to_string()).into_response();
@@ -237,10 +230,7 @@ async fn diagnose(State(shared): Server, Path(name): Path<String>) -> Result<Sta
     Ok(StatusCode::ACCEPTED)
 }
 
-async fn page(
-    State(shared): Server,
-    Path((name, page)): Path<(String, String)>,
-) -> Result<Response, Response> {
+async fn page(State(shared): Server, Path((name, page)): Path<(String, String)>) -> Answer {
     let folder = folder(&shared, &name)?;
     let found = beside(move || pages::page(&folder, &page)).await?;
     Ok(found.map_or_else(|why| failed_to(&why), html))
@@ -255,7 +245,7 @@ struct Several {
     by: Option<GroupBy>,
 }
 
-async fn compare(State(shared): Server, Query(several): Query<Several>) -> Result<Response, Response> {
+async fn compare(State(shared): Server, Query(several): Query<Several>) -> Answer {
     let names = several.runs.split('/');
     let folders = names.map(|name| folder(&shared, name)).collect::<Result<Vec<_>, _>>()?;
     if !(2..=MOST_COMPARED).contains(&folders.len()) {
@@ -277,11 +267,8 @@ struct ControlRequest {
     ask: Ask,
 }
 
-async fn ask(
-    State(shared): Server,
-    Path(name): Path<String>,
-    Json(ControlRequest { ask }): Json<ControlRequest>,
-) -> Result<StatusCode, Response> {
+async fn ask(State(shared): Server, Path(name): Path<String>, Json(request): Json<ControlRequest>) -> Done {
+    let ControlRequest { ask } = request;
     shared.guard.count().map_err(IntoResponse::into_response)?;
     if !shared.passes_on(ask) {
         let why = "this dashboard was started without --allow-control: it stops runs, and nothing else";

@@ -7,6 +7,7 @@
 //! new subscription begins with all passes and events so far and the last state. Nothing that a client sends
 //! reaches the run.
 
+use super::api::Server;
 use super::server::Shared;
 use super::{pages, stream};
 use crate::live::{Message, TimedEvent, View};
@@ -37,16 +38,12 @@ const INFO: u8 = 0;
 const ERROR: u8 = 2;
 
 /// Answers a client that follows the newest live run, and the next one after its end.
-pub async fn newest(State(shared): State<Arc<Shared>>, upgrade: WebSocketUpgrade) -> Response {
+pub async fn newest(State(shared): Server, upgrade: WebSocketUpgrade) -> Response {
     begin(shared, None, upgrade)
 }
 
 /// Answers a client that follows one run.
-pub async fn one(
-    State(shared): State<Arc<Shared>>,
-    Path(name): Path<String>,
-    upgrade: WebSocketUpgrade,
-) -> Response {
+pub async fn one(State(shared): Server, Path(name): Path<String>, upgrade: WebSocketUpgrade) -> Response {
     match shared.folder(&name) {
         Some(_) => begin(shared, Some(name), upgrade),
         None => StatusCode::NOT_FOUND.into_response(),
@@ -159,21 +156,19 @@ impl Client {
 
     /// Passes a run's message on; whether the client took it.
     async fn tell(&mut self, message: Message) -> bool {
-        let payloads = match &message {
-            Message::State(state) => curves(0, &state.signals),
-            Message::Pass(pass) => of_pass(pass),
-            Message::Event(event) => of_event(event),
-            _ => Payloads::new(),
-        };
-        let words = match &message {
+        let (mut payloads, mut words) = (Payloads::new(), None);
+        match &message {
+            Message::State(state) => payloads = curves(0, &state.signals),
+            Message::Pass(pass) => payloads = of_pass(pass),
+            Message::Event(event) => payloads = of_event(event),
             Message::Run(run) => {
                 let name = run.folder.file_name().unwrap_or_default().to_string_lossy();
-                Some(format!("streaming run {name}; live runs: {}", live(&self.shared).await))
+                words = Some(format!("streaming run {name}; live runs: {}", live(&self.shared).await));
             }
-            Message::Ended(_) => Some("the run has ended".into()),
-            Message::Off(words) => Some(words.clone()),
-            _ => None,
-        };
+            Message::Ended(_) => words = Some("the run has ended".into()),
+            Message::Off(off) => words = Some(off.clone()),
+            Message::Progress(_) => {}
+        }
         // A state is of its own time, everything else of the last state's.
         self.view.take(message);
         let taken = match words {

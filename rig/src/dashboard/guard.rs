@@ -78,11 +78,7 @@ impl Guard {
         };
         let in_query = || query?.split('&').find_map(|pair| pair.strip_prefix("token="));
         let given = bearer.or_else(beside).or_else(in_query);
-        if given.is_some_and(|given| same(given, &self.token)) {
-            Ok(())
-        } else {
-            Err(StatusCode::UNAUTHORIZED)
-        }
+        given.filter(|given| same(given, &self.token)).map(|_| ()).ok_or(StatusCode::UNAUTHORIZED)
     }
 
     /// Counts an ask; refuses it where there were too many of late.

@@ -2,6 +2,7 @@
 //! slow one fewer states, never fewer passes or events. A browser gets the messages line by line;
 //! [`super::foxglove`] gets them in the same way.
 
+use super::api::Server;
 use super::guard::PROTOCOL;
 use super::server::Shared;
 use crate::live::{Heard, Message, Viewer};
@@ -29,11 +30,7 @@ const LARGEST: usize = 256;
 const LOOK_EVERY: Duration = Duration::from_millis(200);
 
 /// Answers a browser's request for a stream.
-pub async fn stream(
-    State(shared): State<Arc<Shared>>,
-    Path(name): Path<String>,
-    upgrade: WebSocketUpgrade,
-) -> Response {
+pub async fn stream(State(shared): Server, Path(name): Path<String>, upgrade: WebSocketUpgrade) -> Response {
     let Some(folder) = shared.folder(&name) else { return StatusCode::NOT_FOUND.into_response() };
     let upgrade = upgrade.protocols([PROTOCOL]);
     let source = move |shared: &Shared, to: &Sender<Message>| hear(&folder, shared, to);

@@ -10,10 +10,8 @@ const SECOND: usize = 10;
 
 /// A number in so many decimals and its unit, or `none`.
 pub fn value(value: Option<f64>, scale: f64, decimals: usize, unit: &str) -> String {
-    match value.filter(|v| v.is_finite()) {
-        Some(v) => format!("{:.decimals$}{unit}", v * scale),
-        None => "none".into(),
-    }
+    let value = value.filter(|v| v.is_finite()).map(|v| v * scale);
+    value.map_or_else(|| "none".into(), |v| format!("{v:.decimals$}{unit}"))
 }
 
 /// The same with its sign.

@@ -15,9 +15,10 @@ const EVERY: Duration = Duration::from_millis(150);
 /// Paints until the view is over or its terminal is gone.
 pub(super) fn paint(shared: &Shared) {
     let look = Look::of_environment();
-    let mut screen = Screen::default();
+    // What the terminal shows; nothing has no area.
+    let mut shown = Buffer::default();
     while !shared.is_over() {
-        if !screen.put(|area| page(shared, look, area)) {
+        if !put(&mut shown, |area| page(shared, look, area)) {
             return;
         }
         std::thread::sleep(EVERY);
@@ -44,29 +45,19 @@ fn page(shared: &Shared, look: Look, area: Rect) -> Buffer {
     buffer
 }
 
-/// What the terminal shows.
-#[derive(Default)]
-struct Screen {
-    shown: Option<Buffer>,
-}
-
-impl Screen {
-    /// Puts a page; says whether the terminal is there and still this view's.
-    fn put(&mut self, page: impl FnOnce(Rect) -> Buffer) -> bool {
-        let (width, height) = terminal::size();
-        let area = Rect::new(0, 0, width, height);
-        let mut bytes = Vec::new();
-        if self.shown.as_ref().is_none_or(|shown| shown.area != area) {
-            bytes.extend_from_slice(terminal::ENTER);
-            self.shown = Some(Buffer::empty(area));
-        }
-        let page = page(area);
-        let shown = self.shown.replace(page);
-        if let (Some(shown), Some(page)) = (&shown, &self.shown) {
-            bytes.extend(sequences(&shown.diff(page)));
-        }
-        write(&bytes)
+/// Puts a page in place of what is `shown`; says whether the terminal is there and still this view's.
+fn put(shown: &mut Buffer, page: impl FnOnce(Rect) -> Buffer) -> bool {
+    let (width, height) = terminal::size();
+    let area = Rect::new(0, 0, width, height);
+    let mut bytes = Vec::new();
+    if shown.area != area {
+        bytes.extend_from_slice(terminal::ENTER);
+        *shown = Buffer::empty(area);
     }
+    let page = page(area);
+    bytes.extend(sequences(&shown.diff(&page)));
+    *shown = page;
+    write(&bytes)
 }
 
 /// What makes a terminal show these cells: the cursor's moves, the styles and the signs. The style is the

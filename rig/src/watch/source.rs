@@ -99,14 +99,12 @@ impl Folder {
 
 /// How a run ended that no process leads.
 fn end_of(folder: &Path) -> Ended {
-    match summary(folder) {
-        Some(summary) => Ended::of(&Ok(summary)),
-        None => {
-            let error = Some("it has no summary: its process ended without one".into());
-            let off = Some("nobody has seen whether the drive is off: check the amplifier".into());
-            Ended { error, off, ..Ended::default() }
-        }
-    }
+    let Some(summary) = summary(folder) else {
+        let error = Some("it has no summary: its process ended without one".into());
+        let off = Some("nobody has seen whether the drive is off: check the amplifier".into());
+        return Ended { error, off, ..Ended::default() };
+    };
+    Ended::of(&Ok(summary))
 }
 
 fn summary(folder: &Path) -> Option<Summary> {
