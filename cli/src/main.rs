@@ -136,13 +136,9 @@ fn say_version() -> ExitCode {
 
 fn main() -> ExitCode {
     let code = ended();
-    match runs::print::lacks() {
-        Some(why) => {
-            say!("standard output could not be written to its end: {}", cli::plain(&why.to_string()));
-            if code == ExitCode::SUCCESS { ExitCode::from(cli::FAILED) } else { code }
-        }
-        None => code,
-    }
+    let Some(why) = runs::print::lacks() else { return code };
+    say!("standard output could not be written to its end: {}", cli::plain(&why.to_string()));
+    if code == ExitCode::SUCCESS { ExitCode::from(cli::FAILED) } else { code }
 }
 
 /// The status with which the program ends.
@@ -272,16 +268,13 @@ fn usage_error(error: &clap::Error) -> serde_json::Value {
     let text = cli::plain(&error.to_string());
     let joined = |part: &str| part.split_whitespace().collect::<Vec<_>>().join(" ");
     let mut parts = text.split("\n\n");
-    let (what, help) = match error.kind() {
-        ErrorKind::DisplayHelpOnMissingArgumentOrSubcommand => {
-            ("the command is incomplete".to_string(), "add `--help`: it lists what is missing".to_string())
-        }
-        _ => {
-            let first = joined(parts.next().unwrap_or_default());
-            let helps = parts.map(joined).filter(|part| !part.starts_with("For more information"));
-            let what = first.strip_prefix("error: ").unwrap_or(&first).to_string();
-            (what, helps.collect::<Vec<_>>().join("; "))
-        }
+    let (what, help) = if error.kind() == ErrorKind::DisplayHelpOnMissingArgumentOrSubcommand {
+        ("the command is incomplete".to_string(), "add `--help`: it lists what is missing".to_string())
+    } else {
+        let first = joined(parts.next().unwrap_or_default());
+        let helps = parts.map(joined).filter(|part| !part.starts_with("For more information"));
+        let what = first.strip_prefix("error: ").unwrap_or(&first).to_string();
+        (what, helps.collect::<Vec<_>>().join("; "))
     };
     json!({ "error": what, "causes": [], "help": help, "status": cli::REFUSED })
 }

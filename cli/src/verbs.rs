@@ -49,6 +49,7 @@ mod prelude {
 }
 
 use miette::IntoDiagnostic;
+use serde::Serialize;
 use std::fmt::Display;
 use std::path::{Path, PathBuf};
 use std::process::ExitCode;
@@ -171,11 +172,7 @@ pub fn plain(error: &str) -> String {
 }
 
 /// The answer of a verb that is done: the document with `--json`, else words for a person.
-pub fn answered(
-    json: bool,
-    document: &impl serde::Serialize,
-    words: impl Display,
-) -> miette::Result<ExitCode> {
+pub fn answered(json: bool, document: &impl Serialize, words: impl Display) -> miette::Result<ExitCode> {
     match json {
         true => ::runs::print::answer_json(document),
         false => ::runs::out!("{words}"),

@@ -67,9 +67,7 @@ pub fn run(args: Args, json: bool) -> miette::Result<ExitCode> {
         if !json {
             out!("partial: {done} of {sets} sets");
         }
-        if let Err(why) = tell(&scored, seed, sets, true, json) {
-            say!("{why}");
-        }
+        tell(&scored, seed, sets, true, json);
     })?;
     let scored = score_all(&args.of, sets as u64, &mut |s| {
         if args.verbose {
@@ -78,7 +76,7 @@ pub fn run(args: Args, json: bool) -> miette::Result<ExitCode> {
         study.done(Some(s.clone()));
     })?;
     drop(study);
-    tell(&scored, seed, sets, false, json)?;
+    tell(&scored, seed, sets, false, json);
     Ok(ExitCode::SUCCESS)
 }
 
@@ -95,7 +93,7 @@ fn empty(folder: &Path) -> miette::Result<()> {
 }
 
 /// Figures and answers of the sets that were scored.
-fn tell(scored: &[Scored], seed: u64, sets: usize, partial: bool, json: bool) -> miette::Result<()> {
+fn tell(scored: &[Scored], seed: u64, sets: usize, partial: bool, json: bool) {
     let figures = figures(scored);
     let confusion = confusion(scored);
     if json {
@@ -108,8 +106,7 @@ fn tell(scored: &[Scored], seed: u64, sets: usize, partial: bool, json: bool) ->
         if partial {
             document["partial"] = true.into();
         }
-        answer_json(&document);
-        return Ok(());
+        return answer_json(&document);
     }
     out!("{:52} {:>8}  {:>17}  {:>5}  target", "figure", "value", "95 % interval", "n");
     for f in &figures {
@@ -135,5 +132,4 @@ fn tell(scored: &[Scored], seed: u64, sets: usize, partial: bool, json: bool) ->
             out!("  {from:5.3} to {to:5.3}  {stated:.4}  {right:.4} [{low:.4}, {high:.4}]  n {n}");
         }
     }
-    Ok(())
 }

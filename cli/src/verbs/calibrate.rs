@@ -88,8 +88,6 @@ fn show(certificate: &Certificate, out: &Path) {
     let r = &certificate.residuals;
     let [sd, largest] = [r.sd, r.largest].map(number);
     out!("  residuals: {} with sd {sd}, largest {largest} {}", r.count, r.unit);
-    for remark in &certificate.remarks {
-        out!("  note: {remark}");
-    }
+    certificate.remarks.iter().for_each(|remark| out!("  note: {remark}"));
     out!("  valid until {}", certificate.validity.until);
 }

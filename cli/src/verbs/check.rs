@@ -57,9 +57,8 @@ pub fn run(args: Args, json: bool) -> miette::Result<ExitCode> {
             match &verdict {
                 Ok(good) => {
                     say!("{}", folded(&format!("{file}: {}", words(good, on.setup.as_ref())), 2));
-                    for remark in &good.remarks {
-                        say!("{}", folded(&format!("  remark: {remark}"), 2));
-                    }
+                    let remarks = good.remarks.iter().map(|remark| format!("  remark: {remark}"));
+                    remarks.for_each(|remark| say!("{}", folded(&remark, 2)));
                 }
                 Err(e) => say!("{file}:\n{e:?}"),
             }

@@ -21,11 +21,8 @@ enum What {
 pub fn run(args: &Args, json: bool) -> miette::Result<ExitCode> {
     let What::Profile { profile: name } = &args.what;
     let found = runs::setup::library().find(name, Path::new("")).into_diagnostic()?;
-    let profile = match &found {
-        Some(source) => source.profile(),
-        None => drivers::profile(name),
-    }
-    .into_diagnostic()?;
+    let profile =
+        found.map_or_else(|| drivers::profile(name), |source| source.profile()).into_diagnostic()?;
     let page = instruments::document::markdown(&profile);
     answered(json, &json!({ "id": profile.id(), "markdown": page }), page.trim_end())
 }

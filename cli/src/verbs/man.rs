@@ -1,6 +1,7 @@
 //! `muprime man DIR`: manual pages.
 
 use super::prelude::*;
+use clap::Command;
 use runs::files::{make_folder, write_whole};
 
 #[derive(Debug, clap::Args)]
@@ -10,7 +11,7 @@ pub struct Args {
 }
 
 /// Writes a page for the program and for each of its commands; refused: a folder that cannot be written.
-pub fn run(args: &Args, command: &clap::Command, json: bool) -> miette::Result<ExitCode> {
+pub fn run(args: &Args, command: &Command, json: bool) -> miette::Result<ExitCode> {
     make_folder(&args.folder)?;
     let mut command = command.clone().disable_help_subcommand(true);
     command.build();
@@ -24,12 +25,7 @@ pub fn run(args: &Args, command: &clap::Command, json: bool) -> miette::Result<E
     exit(DONE)
 }
 
-fn pages(
-    command: &clap::Command,
-    name: &str,
-    folder: &Path,
-    written: &mut Vec<PathBuf>,
-) -> miette::Result<()> {
+fn pages(command: &Command, name: &str, folder: &Path, written: &mut Vec<PathBuf>) -> miette::Result<()> {
     let (path, mut page) = (folder.join(format!("{name}.1")), Vec::new());
     clap_mangen::Man::new(command.clone()).title(name.to_uppercase()).render(&mut page).into_diagnostic()?;
     write_whole(&path, &page)?;

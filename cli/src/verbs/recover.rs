@@ -46,7 +46,7 @@ pub fn run(args: Args, json: bool) -> miette::Result<ExitCode> {
                     "damaged": found.damaged_places, "because": findings(&found), "integrity": found }));
             } else {
                 say!("{}: {messages} messages saved; the original is {}", shown(), original.display());
-                tell(&found);
+                found.sentences().iter().for_each(|sentence| say!("  {sentence}"));
             }
         }
         Recovery::Whole(found) if json => {
@@ -54,16 +54,10 @@ pub fn run(args: Args, json: bool) -> miette::Result<ExitCode> {
         }
         Recovery::Whole(found) => {
             say!("{}: whole, nothing to do", shown());
-            tell(&found);
+            found.sentences().iter().for_each(|sentence| say!("  {sentence}"));
         }
     }
     exit(DONE)
-}
-
-fn tell(found: &Integrity) {
-    for sentence in found.sentences() {
-        say!("  {sentence}");
-    }
 }
 
 /// Moves the whole record to its place. The original keeps a name at every instant: it is linked beside first.

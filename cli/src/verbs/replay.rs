@@ -52,18 +52,14 @@ pub fn run(args: Args, json: bool) -> miette::Result<ExitCode> {
             tell(&found);
         }
     }
-    for sentence in gone {
-        say!("{sentence}");
-    }
+    gone.iter().for_each(|sentence| say!("{sentence}"));
     exit(if holds { DONE } else { FAILED })
 }
 
 fn tell(found: &Found) {
     let Replay { cycles, equal, missing, first_difference } = &found.replay;
     out!("{}: {equal} of {cycles} cycles decide as recorded", found.record.display());
-    for sentence in found.integrity.sentences() {
-        out!("  {sentence}");
-    }
+    found.integrity.sentences().iter().for_each(|sentence| out!("  {sentence}"));
     if *missing > found.integrity.missing(CYCLES) {
         out!("  {missing} cycles are missing from the record");
     }

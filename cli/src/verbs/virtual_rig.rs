@@ -82,9 +82,7 @@ pub fn run(args: Args, json: bool) -> miette::Result<ExitCode> {
     if json {
         answer_json(&json!({ "modbus_tcp": modbus_tcp, "instruments": embedded.places }));
     } else {
-        for place in &embedded.places {
-            say!("{place}");
-        }
+        embedded.places.iter().for_each(|place| say!("{place}"));
         let listens =
             modbus_tcp.map(|address| format!("listens on {address} (Modbus TCP)")).unwrap_or("runs".into());
         say!("the virtual rig {listens}; Ctrl-C ends it");

@@ -110,12 +110,8 @@ fn partial(mu: &[f64], cycles: u64, json: bool) {
         answer_json(&json!({ "partial": true, "cycles": cycles, "mu_relative": mean, "steady": false }));
         return;
     }
-    match mean {
-        Some(mean) => {
-            out!("partial: {cycles} cycles, NOT steady; mu' = {mean:.4} over the last {}", last.len())
-        }
-        None => out!("partial: {cycles} cycles; too few for a mean"),
-    }
+    let over = |mean| format!(", NOT steady; mu' = {mean:.4} over the last {}", last.len());
+    out!("partial: {cycles} cycles{}", mean.map_or_else(|| "; too few for a mean".into(), over));
 }
 
 /// Runs the case; refuses bad input, and fails with a reason where the run diverged.

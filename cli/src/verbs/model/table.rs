@@ -91,9 +91,7 @@ fn fig_9_study(out: &Path, study: Study) -> miette::Result<(PathBuf, usize, usiz
     reproduce::write_fig_9_table(&file, study, &results)?;
     let points = study.points();
     if study.base.speed_m_s == 0.0 {
-        for line in phases::lines(study, &results) {
-            say!("{line}");
-        }
+        phases::lines(study, &results).iter().for_each(|line| say!("{line}"));
     }
     Ok((file, points.len(), failed))
 }
