@@ -317,8 +317,8 @@ fn same_forces(fitted: &Fitted, leader: usize, rival: usize) -> bool {
 }
 
 /// A pair that says little more than one of its members alone may be that single with a form of its own: a
-/// share of its weight, the less the more it gains, goes to such members, and to singles that do better than
-/// they, in proportion to their evidence.
+/// share of its weight, a smaller one where it gains much, goes to such members, and to singles that do better
+/// than they, in proportion to their evidence.
 fn fold_pairs(fitted: &Fitted, probabilities: &mut [f64]) {
     let k = &fitted.problem.constants;
     let candidates = &fitted.candidates;
@@ -444,6 +444,7 @@ mod tests {
         assert_eq!(report.at_least, ["rate_dependent_friction"]);
         let first = &report.hypotheses[0];
         assert_eq!(first.effects, ["rate_dependent_friction"], "{}", report.text);
+        assert!(first.alias_class.len() > 1, "{:?}", first.alias_class);
         assert!(first.alias_class[1..].iter().all(|name| name.contains('+')), "{:?}", first.alias_class);
     }
 

@@ -193,7 +193,7 @@ pub fn gap(fitted: &Fitted, table: &Table, rig: &RigFile, answer: &Answer) -> Ga
 
 /// Factor on the deviation of the bootstrap's means, for an interval of the share on as many other passes.
 /// Refits to folds share most of their passes, so their errors go together by about the share that is held
-/// out (Nadeau & Bengio 2003); other passes scatter as much as these; and groups that are drawn anew scatter
+/// out (Nadeau & Bengio 2003); other passes scatter as much as these; and groups that are drawn again scatter
 /// about their own mean, by less than about the true one.
 fn widening(folds: usize, groups: usize) -> f64 {
     let [k, g] = [folds, groups].map(|n| n as f64);

@@ -122,7 +122,9 @@ impl Beginning {
     fn identifier(&self) -> Result<(u32, bool), DbcError> {
         // Bit 31 marks identifiers of 29 bits. Some files leave it out where 11 bits are not enough.
         let id = self.raw & 0x7FFF_FFFF;
-        let id = u32::try_from(id).ok().filter(|id| *id <= 0x1FFF_FFFF && self.raw <= u64::from(u32::MAX));
+        let id = u32::try_from(id)
+            .ok()
+            .filter(|id| *id <= super::can::MOST_EXTENDED && self.raw <= u64::from(u32::MAX));
         let (line, raw) = (self.line, self.raw);
         let id = id.ok_or_else(|| DbcError::Identifier { line, raw, message: self.name.clone() })?;
         Ok((id, self.raw >> 31 == 1 || id > 0x7FF))

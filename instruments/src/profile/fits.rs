@@ -144,7 +144,7 @@ impl Compiler<'_> {
                 return Err(self.at_name(name, problem));
             }
         }
-        let long = |m: &&Message| m.request.as_ref().is_some_and(|data| data.len() > 8);
+        let long = |m: &&Message| m.request.as_ref().is_some_and(|data| CanFrame::new(0, data).is_none());
         if let Some(message) = d.message.iter().find(long) {
             let problem = format!("`{}`: a `request` has 8 bytes at most", message.name.as_ref());
             return Err(self.at_name(&message.name, problem));
