@@ -105,7 +105,7 @@ constants! {
     prior_open: f64 = 0.07, "Prior probability of the open set.", JUDGEMENT;
     structure_share: f64 = 0.5, "Share of the open set's weight for departures that are sudden, periodic or local.", JUDGEMENT;
     structure_asked_nats: f64 = 10.0, "Nats behind the best hypothesis up to which the structure of no gap is searched.", NUMERICAL;
-    unlisted_share: f64 = 0.1, "Share of the open set's weight for causes of known form that the library does not name.", JUDGEMENT;
+    unlisted_share: f64 = 0.1, "Share of the open set's smooth part for causes of known form that the library does not name.", JUDGEMENT;
     lapse_probability: f64 = 0.02, "Probability that a certificate no longer holds when a table is taken.", "judgement: one certificate in fifty is outdated by a knock or a change";
     mu0_log_sd: [f64; 2] = [0.3, 0.8], "Prior deviation of ln mu0, with passes at w = 0 and without.", "judgement: wide against the 1 % to which such passes give mu0";
     stiffness_sd_floor: f64 = 1e-3, "Least prior deviation of ln stiffness, whatever rig.toml states.", "numerical: keeps the prior proper";
@@ -125,7 +125,7 @@ constants! {
     suspect_probability: f64 = 0.5, "Probability of not belonging from which a pass is called suspect.", "the likelier of two";
     most_suspects: f64 = 0.2, "Share of suspect passes above which they are a departure.", JUDGEMENT;
     together_level: f64 = 0.01, "Family-wise level at which suspect passes lie together, which makes them a departure.", "one in a hundred";
-    cause_holds_spread: f64 = 1.3, "Median residual about a leading cause, in deviations, up to which it holds and passes that stand out of it are bad.", JUDGEMENT;
+    cause_holds_spread: f64 = 1.3, "Median size of the residuals about a leading cause over 0.6745, in deviations, up to which it holds and passes that deviate from it are bad.", JUDGEMENT;
     explained_sd: f64 = 3.0, "Deviations within which a cause explains a suspect pass, which then belongs.", "three standard deviations";
     serial_probability: f64 = 0.7, "Probability from which scatter is taken to last from pass to pass.", JUDGEMENT;
     serial_modes: usize = 16, "Cosines of its slow part.", "numerical: a drift over the table has less than eight turns";
@@ -158,7 +158,7 @@ constants! {
     driven_sd: f64 = 3.0, "Deviations of its prior beyond which a nuisance is taken to imitate a cause; searches then start at the calibration too.", NUMERICAL;
     prune_nats: f64 = 15.0, "Nats behind the best law from which a law keeps the middle form share only.", NUMERICAL;
     hopeless: [f64; 2] = [1.5, 60.0], "Factor on the best tempered cost, and offset in chi2, beyond which a law is not refined.", NUMERICAL;
-    pairs_from_nats: f64 = 3.0, "Nats by which the best single cause must beat no gap before pairs are tried.", NUMERICAL;
+    pairs_from_nats: f64 = 3.0, "Nats by which a hypothesis must beat no gap before pairs are tried, passes judged again or the table fitted again.", NUMERICAL;
     misfit_sd: f64 = 2.5, "Deviations of chi2 above its mean from which the best single cause is taken to leave something.", NUMERICAL;
     pair_seeds: usize = 6, "Single causes from which pairs are grown, and of which the size is tried as a function of the place and the weather.", NUMERICAL;
     pairs_fitted: usize = 20, "Pairs that are fitted in full.", NUMERICAL;
