@@ -16,7 +16,8 @@ use std::io::Read;
 use std::net::TcpStream;
 use std::os::fd::AsRawFd;
 use std::path::{Path, PathBuf};
-use std::sync::atomic::Ordering;
+use std::sync::Arc;
+use std::sync::atomic::{AtomicUsize, Ordering};
 use std::thread::JoinHandle;
 use std::time::Duration;
 use tests::served::resident_bytes;
@@ -176,14 +177,23 @@ struct Told {
     end: bool,
 }
 
-/// Reads a stream to its end, so many bytes at once with a pause after each.
-fn read_all(mut stream: TcpStream, at_once: usize, pause: Duration) -> JoinHandle<Told> {
+/// Reads a stream to its end and counts its bytes in `read`; never more than half of what `first` has read, however fast the machine is.
+fn read_all(
+    mut stream: TcpStream,
+    read: Arc<AtomicUsize>,
+    first: Option<Arc<AtomicUsize>>,
+) -> JoinHandle<Told> {
     std::thread::spawn(move || {
-        let (mut buffer, mut all) = (vec![0; at_once], Vec::new());
+        let (mut buffer, mut all) = (vec![0; 1 << 12], Vec::new());
+        let ahead = |all: usize| first.as_ref().is_some_and(|first| all > first.load(Ordering::Relaxed) / 2);
         while let Ok(more @ 1..) = stream.read(&mut buffer) {
             all.extend_from_slice(&buffer[..more]);
-            std::thread::sleep(pause);
+            read.store(all.len(), Ordering::Relaxed);
+            while ahead(all.len()) {
+                std::thread::sleep(CLOCK / 10);
+            }
         }
+        read.store(usize::MAX, Ordering::Relaxed);
         let text = String::from_utf8_lossy(&all);
         let count = |about: &str| text.matches(&format!("{{\"about\":\"{about}\"")).count();
         Told { passes: count("pass"), states: count("state"), end: count("ended") == 1 }
@@ -200,16 +210,17 @@ fn viewers_that_do_not_read_hold_nobody_up() {
     let runs = folder.path().join("runs");
     let live = Paced::start(&runs.join("live"), if seconds > 40 { CLOCK } else { CLOCK / 10 });
     let served = Served::start(&runs, &[]);
-    let reader = |stream| read_all(stream, 1 << 16, Duration::ZERO);
-    let readers: Vec<_> = (0..6).map(|_| reader(served.stream("live"))).collect();
-    let slow = read_all(with_room(served.stream("live"), 1 << 15), 1 << 12, CLOCK / 2);
+    let reader = |read: &Arc<AtomicUsize>| read_all(served.stream("live"), read.clone(), None);
+    let reads: Vec<Arc<AtomicUsize>> = (0..8).map(|_| Arc::default()).collect();
+    let readers: Vec<_> = reads[..6].iter().map(reader).collect();
+    let slow = read_all(with_room(served.stream("live"), 1 << 15), reads[6].clone(), Some(reads[0].clone()));
     let mut deaf = with_room(served.stream("live"), 1);
     std::thread::sleep(Duration::from_secs(seconds / 4));
     let before = resident_bytes(served.process.id()).unwrap();
     std::thread::sleep(Duration::from_secs(seconds - seconds / 4));
     let after = resident_bytes(served.process.id()).unwrap();
     assert!(after < before + (16 << 20), "{before} bytes, then {after}");
-    let again = reader(served.stream("live"));
+    let again = reader(&reads[7]);
     std::thread::sleep(Duration::from_secs(2));
     let passes = live.passes();
     let told: Vec<Told> = readers.into_iter().map(|reader| reader.join().unwrap()).collect();
