@@ -24,6 +24,6 @@ pub trait CanPort: Send {
     /// Sends a frame; `false` where there is no room for it now (back-pressure), and then it is not sent.
     fn send(&mut self, frame: &CanFrame) -> io::Result<bool>;
 
-    /// The next event until `deadline`; `None` where none came.
+    /// The next event until `deadline`, which the caller has from its own clock; `None` where none came.
     fn receive(&mut self, deadline: Instant) -> io::Result<Option<CanEvent>>;
 }

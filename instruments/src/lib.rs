@@ -5,7 +5,7 @@
 //! driver (crate `drivers`), the emulator (crate `sim`) and the generated documentation all use that one
 //! description; the vectors and the independent peers of the system tests say whether it is right.
 //!
-//! This crate is pure: bytes in, values out. It knows no socket, no clock and no file.
+//! This crate is pure: bytes in, values out. It opens no socket or file; a deadline is an argument.
 //!
 //! | module | purpose |
 //! |---|---|

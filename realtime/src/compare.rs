@@ -141,7 +141,7 @@ impl Comparator {
         let unit = if vibrating { coulomb } else { 0.0 };
         let judged = known.map(|_| pulls(c));
         self.power.push(unit, &slope, &gain, variance, judged, judged.filter(|_| vibrating).map(|_| z));
-        // What lies beyond the cap is no news of the shared parameters: a filter that followed it would take
+        // What lies beyond the cap says nothing of the shared parameters: a filter that followed it would take
         // up in one pass what it is there to judge. The first word on mu_0 is taken whole.
         let taken = if known.is_some() { z.clamp(-CAP, CAP) * variance.sqrt() } else { innovation };
         for (estimate, gain) in self.estimate.iter_mut().zip(&gain) {

@@ -3,6 +3,7 @@
 //! Order: commands and safety ([`decide`]), then estimate and comparison ([`judge`]), so that a decision can
 //! leave before a model runs. Everything that a cycle can reach is `Copy` (checked below), so it holds no
 //! lock, no heap and no handle. The model is reached through `&`, and models hold plain tables.
+#![deny(clippy::disallowed_types, clippy::disallowed_methods)]
 
 use crate::estimate::{EstimateConfig, Mu0, MuRelative, NoMu, Window};
 use crate::ports::Nanos;

@@ -2,7 +2,7 @@
 //!
 //! Duties: decide each cycle, before anything else, whether the rig may drive and move; latch what went wrong
 //! with its cause, value, bound and cycle; hand out commands that the limits allow. Owners: `limits.rs` the
-//! numbers, `watch.rs` and `exposure.rs` the memory, `rules.rs` the rules with their requirement identifiers,
+//! numbers, `watch.rs`, `envelope.rs` and `exposure.rs` the memory, `rules.rs` the rules with their identifiers,
 //! `cause.rs` the texts of a trip, `arming.rs` the way to armed; here states, requests and commands.
 //!
 //! ```text

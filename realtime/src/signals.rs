@@ -1,4 +1,5 @@
 //! What a rig's instruments deliver: readings and states, each with its time; a missing one is a [`NoData`].
+#![deny(clippy::disallowed_types, clippy::disallowed_methods)]
 
 use models::quantity::PeakToPeak;
 use serde::{Deserialize, Serialize};

@@ -102,8 +102,8 @@ causes! {
     Interlock "the guard is open, or its contact does not answer" => "Close the guard and start the run again; if it was closed, check its wire and its input.";
     /// The second switch-off channel does not follow its command, or nothing is known of it.
     SupplySwitch "the supply relay does not do what it is commanded" => "Check the relay in the supply, its mirror contact and their wires: it does not follow its commands.";
-    /// What must be there to switch off is not fitted: 1 a second channel beside an amplifier without
-    /// watchdog; with a human finger 2 a second channel, 3 an emergency stop, 4 a dead-man device.
+    /// What must be there to switch off is not fitted: 1 a second channel beside an amplifier without watchdog;
+    /// with a human finger 2 a second channel, 3 an emergency stop, 4 a dead-man device, 5 a watchdog.
     Unguarded "a guard that this rig needs is missing" => "Fit what is missing and state it in the setup: [supply_relay], [safety_inputs].";
     ExposureDuty "the finger was vibrated for too large a share of the last hour" => "Remove the finger: the hourly limit of vibration is reached. Resume after a rest.";
     ExposureDose "the vibration of the last hour was too strong for the finger" => "Remove the finger: the hourly dose of vibration is reached. Resume after a rest, with less amplitude.";
