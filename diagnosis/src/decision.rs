@@ -283,7 +283,7 @@ fn left_by_a_form_of_its_own(fitted: &Fitted, cause: &Candidate) -> f64 {
     let Some(best) = laws.max_by(|a, b| a.log_evidence.total_cmp(&b.log_evidence)) else {
         return f64::INFINITY;
     };
-    problem.misfit(&(&best.prediction + best.departed(&fitted.basis))) - problem.len() as f64
+    problem.misfit(&(&best.prediction + best.departure_n(&fitted.basis))) - problem.len() as f64
 }
 
 /// chi2 that a model leaves beyond scatter.

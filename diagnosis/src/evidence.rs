@@ -62,7 +62,7 @@ impl Posterior {
     }
 
     /// The departure from the form at the passes of the fit, N.
-    pub fn departed(&self, basis: &Basis) -> DVector<f64> {
+    pub fn departure_n(&self, basis: &Basis) -> DVector<f64> {
         self.change.columns(basis, self.freedom.share) * &self.departure
     }
 

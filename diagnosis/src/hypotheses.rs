@@ -4,8 +4,8 @@
 //! lasting scatter may be a cause in disguise. [`fit_believing`] is one such fit, in this order:
 //!
 //! ```text
-//! scatter (noise, scatter) -> no gap -> singles -> lapsed certificates -> passes judged about the leader,
-//! begin again?
+//! scatter (noise, scatter) -> no gap -> singles -> lapsed certificates
+//!   -> passes judged about the baseline, then about the leader: begin again?
 //!   -> unlisted causes -> pairs, their members again -> structure and shapes -> Fitted
 //! ```
 //!
@@ -142,8 +142,8 @@ pub fn fit_believing(table: &Table, rig: &RigFile, options: &Options, belief: &B
         }
     }
     if let (Belief::Judged, Some(leader)) = (belief, leader) {
-        let departed = leader.best.departed(&basis);
-        if let Some(other) = scatter.about_cause(&problem, &(&leader.best.prediction + departed)) {
+        let departure = leader.best.departure_n(&basis);
+        if let Some(other) = scatter.about_mean(&problem, &(&leader.best.prediction + departure)) {
             return fit_believing(table, rig, options, &other);
         }
     }

@@ -171,7 +171,7 @@ fn beside_a_function(
     if leader.freedom.bend == 0.0 {
         return Vec::new();
     }
-    let taken = leader.departed(basis);
+    let taken = leader.departure_n(basis);
     let lateral = problem.lateral.iter().zip(taken.iter()).map(|(all, taken)| all - taken).collect();
     let rest = Problem { lateral, ..problem.clone() };
     let mut starts = coarse_starts(&rest, &singles[..1], singles, loose);

@@ -112,11 +112,11 @@ pub enum Belief {
     Judged,
     /// All.
     All,
-    /// By residuals about a leading cause, in deviations of a pass, and the probabilities not to belong that they give.
-    AboutCause {
-        /// Residuals.
+    /// By residuals about the mean of a leading cause or of the baseline, and what follows from them.
+    AboutMean {
+        /// Residuals, in deviations of a pass.
         deviations: Vec<f64>,
-        /// Probabilities.
+        /// Probabilities not to belong.
         outside: Vec<f64>,
     },
 }
@@ -143,7 +143,7 @@ pub fn estimate(
     let mut level = under.clone();
     let mut variance = stated(&level);
     let mut weight = match belief {
-        Belief::AboutCause { deviations, outside } => suspects::weights(k, outside, deviations),
+        Belief::AboutMean { deviations, outside } => suspects::weights(k, outside, deviations),
         _ => vec![1.0; n],
     };
     let (mut best, mut state) = (0, start);
@@ -180,7 +180,7 @@ pub fn estimate(
             (seen.left_out, outside, place)
         }
         Belief::All => (seen.left_out, vec![0.0; n], None),
-        Belief::AboutCause { deviations, outside } => (deviations.clone(), outside.clone(), None),
+        Belief::AboutMean { deviations, outside } => (deviations.clone(), outside.clone(), None),
     };
     let weight = suspects::weights(k, &outside, &deviations);
     let (whole, _) = surface.climbed(&variance, &weight, &level, state);
@@ -221,11 +221,11 @@ pub fn estimate(
 }
 
 impl Scatter {
-    /// A second look at which passes belong, about the mean of a leading cause; none where it says nothing new.
+    /// Which passes belong, judged again about the mean of a leading cause; none where that says nothing new.
     ///
     /// What the cause explains belongs after all, though a surface did not follow it. What stands out of it is bad where the
     /// cause holds for the others: their scatter is no larger than it should be, and those that stand out fall anywhere.
-    pub fn about_cause(&self, problem: &Problem, mean: &DVector<f64>) -> Option<Belief> {
+    pub fn about_mean(&self, problem: &Problem, mean: &DVector<f64>) -> Option<Belief> {
         let k = &*problem.constants;
         let n = problem.len();
         let residual = DVector::from_column_slice(&problem.lateral) - mean;
@@ -251,7 +251,7 @@ impl Scatter {
         let weight = suspects::weights(k, &outside, &deviations);
         let regained: f64 =
             (0..n).filter(|&i| !called(&outside[i])).map(|i| weight[i] - 1.0 / self.inflation[i]).sum();
-        (found || regained > WORTH).then_some(Belief::AboutCause { deviations, outside })
+        (found || regained > WORTH).then_some(Belief::AboutMean { deviations, outside })
     }
 
     /// The same about the recalibrated baseline, where that makes a few more passes suspect.
@@ -262,8 +262,8 @@ impl Scatter {
             suspects(outside) > suspects(&self.outside)
                 && suspects(outside) as f64 <= FEW * problem.len() as f64
         };
-        let about = self.about_cause(problem, mean);
-        about.filter(|belief| matches!(belief, Belief::AboutCause { outside, .. } if few(outside)))
+        let about = self.about_mean(problem, mean);
+        about.filter(|belief| matches!(belief, Belief::AboutMean { outside, .. } if few(outside)))
     }
 
     /// Enters a problem whose variances are those of single passes: what passes have in common leaves them
