@@ -56,7 +56,7 @@ fn run(setup: &str, tables: &str, plan: &str, defects: Option<&str>, answers: Op
     let defects = defects.map(|text| sim::defects::Defects::parse(text).unwrap());
     let job = Job { defects, answers, ..job(setup, plan, &out) };
     let (mut passes, mut events) = (Vec::new(), Vec::new());
-    let summary = job.run_in_virtual_time(&Signals::default(), &mut |news| match news {
+    let summary = job.run_in_virtual_time(&Signals::default(), &mut |update| match update {
         Update::Pass(pass) => passes.push(pass.clone()),
         Update::Event(event) => events.push(event.clone()),
         _ => {}
@@ -119,8 +119,8 @@ fn the_stated_air_of_a_virtual_rig_is_the_air_of_its_world() {
         let folder = tempfile::tempdir().unwrap();
         let job = job(setup, &plan, &folder.path().join("run"));
         let mut passes = Vec::new();
-        let mut keep = |news: Update<'_>| {
-            if let Update::Pass(pass) = news {
+        let mut keep = |update: Update<'_>| {
+            if let Update::Pass(pass) = update {
                 passes.push(pass.clone());
             }
         };
@@ -418,8 +418,8 @@ fn operator_sample_and_protocol_survive_a_resume_and_go_into_every_form() {
         let stops = Arc::clone(&signals.stops);
         let job = Job { notes, ..job(setup.clone(), &text, &out) };
         let mut made = 0;
-        job.run_in_virtual_time(&signals, &mut |news| {
-            made += usize::from(matches!(news, Update::Pass(_)));
+        job.run_in_virtual_time(&signals, &mut |update| {
+            made += usize::from(matches!(update, Update::Pass(_)));
             if stop_after == Some(made) {
                 stops.store(1, std::sync::atomic::Ordering::Relaxed);
             }

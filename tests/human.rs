@@ -57,12 +57,12 @@ fn run(tables: &str, limits: &str, hand: bool) -> (Outcome, usize, usize, Vec<Ev
         answers: None,
     };
     let mut events = Vec::new();
-    let mut news = |news: Update<'_>| {
-        if let Update::Event(event) = news {
+    let mut update = |update: Update<'_>| {
+        if let Update::Event(event) = update {
             events.push(event.clone());
         }
     };
-    let summary = rig::session::run(job, &Signals::default(), &mut news).unwrap();
+    let summary = rig::session::run(job, &Signals::default(), &mut update).unwrap();
     (summary.outcome, summary.passes, summary.planned, events)
 }
 

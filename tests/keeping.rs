@@ -132,8 +132,8 @@ fn a_drift_is_named_when_the_run_was_stopped_and_taken_up_again() {
             };
             let (signals, mut made) = (Signals::default(), 0);
             let stops = Arc::clone(&signals.stops);
-            rig::session::run(job, &signals, &mut |news| {
-                made += usize::from(matches!(news, Update::Pass(_)));
+            rig::session::run(job, &signals, &mut |update| {
+                made += usize::from(matches!(update, Update::Pass(_)));
                 if stop == Some(made) {
                     stops.store(1, Ordering::Relaxed);
                 }

@@ -22,7 +22,7 @@ use tokio_modbus::client::{Context, Reader, Writer, tcp};
 use tokio_modbus::prelude::Slave;
 
 /// Whoever waits for an answer looks at the clock so often.
-const LOOK_EVERY: Duration = Duration::from_millis(10);
+const POLL_EVERY: Duration = Duration::from_millis(10);
 
 /// Starts the thread of one instrument.
 pub(crate) fn spawn(instrument: &InstrumentSetup, session: Session) -> Result<JoinHandle<Closed>, Ended> {
@@ -69,7 +69,7 @@ fn within<T>(
     runtime.block_on(async {
         let mut request = std::pin::pin!(request);
         loop {
-            let left = Duration::from_nanos(deadline.since(clock.now()).0).min(LOOK_EVERY);
+            let left = Duration::from_nanos(deadline.since(clock.now()).0).min(POLL_EVERY);
             if let Ok(answer) = tokio::time::timeout(left, request.as_mut()).await {
                 return Ok(answer);
             }

@@ -46,7 +46,7 @@ pub struct Pass {
     pub replicate: Option<u64>,
     /// Name of the run, in tables of several.
     pub run: Option<String>,
-    /// Number of the session of its run, from 1: a run that is stopped and taken up again has several.
+    /// Number of the session of its run, from 1: a run that is stopped and resumed has several.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub session: Option<u64>,
 }

@@ -15,7 +15,7 @@ use std::sync::atomic::Ordering;
 #[pyfunction]
 pub fn load(py: Python<'_>, folder: PathBuf) -> PyResult<(Py<PyBytes>, String)> {
     let loaded = py.detach(|| -> miette::Result<_> {
-        let run = runs::report::read(&folder)?;
+        let run = runs::run_data::read(&folder)?;
         let about = serde_json::json!({ "facts": run.facts, "summary": run.summary, "damage": run.damage });
         Ok((tables::export::arrow_bytes(&run)?, about.to_string()))
     });
@@ -28,7 +28,7 @@ pub fn load(py: Python<'_>, folder: PathBuf) -> PyResult<(Py<PyBytes>, String)> 
 #[pyfunction]
 pub fn cycles(py: Python<'_>, folder: PathBuf, points: Vec<u32>) -> PyResult<Py<PyBytes>> {
     let bytes = py
-        .detach(|| tables::export::cycles_bytes(&folder, &runs::report::read(&folder)?, &points))
+        .detach(|| tables::export::cycles_bytes(&folder, &runs::run_data::read(&folder)?, &points))
         .map_err(refused)?;
     Ok(PyBytes::new(py, &bytes).unbind())
 }

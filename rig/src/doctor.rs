@@ -1,10 +1,11 @@
-//! The instruments of a setup, looked at together as a run's loop would, and judged by what a run needs.
-//! Nothing is commanded but the safe set-points with which every link begins and ends.
+//! The instruments of a setup, read together as by a run's loop, and judged by what a run needs; and this
+//! computer ([`machine`]). Nothing is commanded but the safe set-points with which every link begins and ends.
 
-#![allow(clippy::disallowed_methods, reason = "instruments are looked at in wall-clock time; no loop runs")]
+#![allow(clippy::disallowed_methods, reason = "instruments are read in wall-clock time; no loop runs")]
 
 mod follow;
 mod judge;
+pub mod machine;
 mod ports;
 
 pub use follow::{ChannelReport, Follow};
@@ -20,15 +21,15 @@ use runs::setup::Setup;
 use serde::Serialize;
 use std::time::{Duration, Instant};
 
-/// How long the instruments are looked at: a rule about the load needs two seconds.
-const LOOK: Duration = Duration::from_millis(3000);
+/// How long the instruments are read: a rule about the load needs two seconds.
+const INSPECTION: Duration = Duration::from_millis(3000);
 /// What of that the links may take to run evenly.
 const SETTLING: Duration = Duration::from_millis(400);
 
 /// What an instrument is to the rig, in the words of the setup.
 pub type Role = &'static str;
 
-/// What a link counted in a second, on the whole look.
+/// What a link counted in a second, over the whole inspection.
 #[derive(Clone, Debug, Default, Serialize)]
 pub struct Answers {
     /// Samples a second.
@@ -62,14 +63,14 @@ pub struct Found {
 }
 
 /// Everything that was found.
-pub struct Look {
+pub struct Inspection {
     /// Each instrument, in the order of the setup.
     pub found: Vec<Found>,
     /// What was seen last of all; of what could not be opened [`NoData::NotFitted`].
     pub seen: Observation,
     /// The rule that most often prevented arming, with the share of cycles in which any did; if all opened.
     pub blocking: Option<(Cause, f64)>,
-    /// Stalls of this computer during the look: what the links lost then is not their fault.
+    /// Stalls of this computer during the inspection: what the links lost then is not their fault.
     pub stalls: StallReport,
 }
 
@@ -129,7 +130,7 @@ fn reports(
     .collect()
 }
 
-impl Look {
+impl Inspection {
     /// Whether a relay is fitted in the amplifier's supply and reads open.
     fn supply_is_open(&self) -> bool {
         self.seen.supply.is_ok_and(|supply| supply.cut)
@@ -181,8 +182,8 @@ impl Rules {
     }
 }
 
-/// Looks at every instrument that can be opened; one that fails keeps none of the others from being looked at.
-pub fn look(setup: &Setup, instruments: &InstrumentsSetup) -> Look {
+/// Reads every instrument that can be opened; one that fails keeps none of the others from being read.
+pub fn inspect(setup: &Setup, instruments: &InstrumentsSetup) -> Inspection {
     let epoch = Instant::now();
     let (all, mut bench) = ports::open(setup, instruments, epoch);
     let monitor = StallMonitor::start(realtime::pacing::monotonic_ns());
@@ -191,15 +192,15 @@ pub fn look(setup: &Setup, instruments: &InstrumentsSetup) -> Look {
     let counted = || -> Vec<HealthReport> { all.iter().map(Opened::health).collect() };
     let (opened, cycle) = (Instant::now(), Duration::from_nanos(setup.config.limits.timing.cycle.0));
     let (mut before, mut last, mut deadline) = (None, None, opened);
-    while opened.elapsed() < LOOK {
+    while opened.elapsed() < INSPECTION {
         deadline = (deadline + cycle).max(Instant::now());
         std::thread::sleep(deadline.saturating_duration_since(Instant::now()));
         let now = Nanos(u64::try_from(epoch.elapsed().as_nanos()).unwrap_or(u64::MAX));
-        let seen = bench.look(now);
-        rules.step(&seen, now, opened.elapsed() > LOOK / 2);
+        let seen = bench.read(now);
+        rules.step(&seen, now, opened.elapsed() > INSPECTION / 2);
         if opened.elapsed() > SETTLING {
             before.get_or_insert_with(|| (counted(), Instant::now()));
-            followed.iter_mut().zip(channels(&seen)).for_each(|(follow, (.., seen))| follow.look(seen, now));
+            followed.iter_mut().zip(channels(&seen)).for_each(|(follow, (.., seen))| follow.take(seen, now));
             last = Some(seen);
         }
     }
@@ -209,7 +210,7 @@ pub fn look(setup: &Setup, instruments: &InstrumentsSetup) -> Look {
     let (before, began) = before.unwrap_or_else(|| (after.clone(), opened));
     let seconds = began.elapsed().as_secs_f64();
     let whole = all.iter().all(|o| o.link.is_ok());
-    let last = last.unwrap_or_else(|| bench.look(Nanos(0)));
+    let last = last.unwrap_or_else(|| bench.read(Nanos(0)));
     let found = all.into_iter().zip(before.iter().zip(&after)).map(|(o, (before, after))| Found {
         role: o.role,
         id: o.instrument.profile.clone(),
@@ -220,7 +221,7 @@ pub fn look(setup: &Setup, instruments: &InstrumentsSetup) -> Look {
         },
         answers: o.link.map(|_link| answers(o.instrument, [before, after], seconds)),
     });
-    Look { found: found.collect(), seen: last, blocking: rules.worst().filter(|_| whole), stalls }
+    Inspection { found: found.collect(), seen: last, blocking: rules.worst().filter(|_| whole), stalls }
 }
 
 fn answers(instrument: &InstrumentSetup, [before, after]: [&HealthReport; 2], seconds: f64) -> Answers {

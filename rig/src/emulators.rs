@@ -23,7 +23,7 @@ use std::net::SocketAddr;
 
 /// Running emulators; dropping them stops them.
 #[derive(Default)]
-pub struct Embedded {
+pub struct Emulators {
     serving: Vec<Box<dyn Any + Send>>,
     /// Where the Modbus TCP server listens, if there is one.
     pub modbus_tcp: Option<SocketAddr>,
@@ -31,8 +31,8 @@ pub struct Embedded {
     pub places: Vec<String>,
 }
 
-impl Embedded {
-    fn serve(&mut self, emulator: impl Any + Send) {
+impl Emulators {
+    fn add(&mut self, emulator: impl Any + Send) {
         self.serving.push(Box::new(emulator));
     }
 }
@@ -41,30 +41,30 @@ impl Embedded {
 ///
 /// # Errors
 /// An address that cannot be served, or a profile that names what the world does not have.
-pub fn embed(
+pub fn serve(
     setup: &mut InstrumentsSetup,
     plant: &SharedPlant,
     everywhere: bool,
-) -> Result<Embedded, String> {
+) -> Result<Emulators, String> {
     if let Some(weight) = setup.stage.dead_weight_n {
         plant.now().0.command(&[(Command::NormalForce, weight)]);
     }
     let mut all: Vec<&mut InstrumentSetup> = setup.all_mut().collect();
-    let (embedded, registers, lines, buses) = Default::default();
-    let mut serving = Serving { plant, everywhere, embedded, registers, lines, buses };
+    let (emulators, registers, lines, buses) = Default::default();
+    let mut serving = Serving { plant, everywhere, emulators, registers, lines, buses };
     for instrument in &mut all {
         serving.one(instrument)?;
     }
-    let mut embedded = serving.shared(&mut all)?;
-    embedded.places = all.iter().map(|one| format!("{} at {}", one.profile, one.address)).collect();
-    Ok(embedded)
+    let mut emulators = serving.shared(&mut all)?;
+    emulators.places = all.iter().map(|one| format!("{} at {}", one.profile, one.address)).collect();
+    Ok(emulators)
 }
 
 /// What is served so far, and the places that several instruments may share, by address.
 struct Serving<'a> {
     plant: &'a SharedPlant,
     everywhere: bool,
-    embedded: Embedded,
+    emulators: Emulators,
     registers: BTreeMap<String, BTreeMap<u8, Device>>,
     lines: BTreeMap<String, BTreeMap<u8, Device>>,
     buses: BTreeMap<String, Vec<CanDevice>>,
@@ -73,7 +73,7 @@ struct Serving<'a> {
 impl Serving<'_> {
     /// Serves an instrument that has its place for itself; another one is put to those of its place.
     fn one(&mut self, instrument: &mut InstrumentSetup) -> Result<(), String> {
-        let (plant, everywhere, embedded) = (self.plant, self.everywhere, &mut self.embedded);
+        let (plant, everywhere, emulators) = (self.plant, self.everywhere, &mut self.emulators);
         let mut profile = instrument.description().map_err(|error| error.to_string())?;
         if let Some(rate) = instrument.rate_hz {
             // What comes by itself comes as often as the setup expects it.
@@ -101,7 +101,7 @@ impl Serving<'_> {
                 if instrument.address.ends_with("pty") {
                     let port = port(&mut instrument.address)?;
                     let units = [(unit, device)].into_iter().collect();
-                    embedded.serve(SerialEmulator::modbus_rtu(port, units, plant.clone()).map_err(failed)?);
+                    emulators.add(SerialEmulator::modbus_rtu(port, units, plant.clone()).map_err(failed)?);
                 } else {
                     let units = self.lines.entry(instrument.address.clone()).or_default();
                     if units.insert(unit, device).is_some() {
@@ -114,8 +114,7 @@ impl Serving<'_> {
                 let devices = CanDevice { device, base };
                 if instrument.address.starts_with("slcan:") {
                     let adapter = EmulatedAdapter::new(port(&mut instrument.address)?);
-                    embedded
-                        .serve(CanEmulator::start(adapter, vec![devices], plant.clone()).map_err(failed)?);
+                    emulators.add(CanEmulator::start(adapter, vec![devices], plant.clone()).map_err(failed)?);
                 } else {
                     self.buses.entry(instrument.address.clone()).or_default().push(devices);
                 }
@@ -127,53 +126,53 @@ impl Serving<'_> {
                 } else {
                     SerialEmulator::lines(port, LineInstrument::new(device, plant.clone()), || None)
                 };
-                embedded.serve(served.map_err(failed)?);
+                emulators.add(served.map_err(failed)?);
             }
             LinkKind::Tcp | LinkKind::Udp if device.profile().description.stream.is_some() => {
                 let place = socket(&instrument.address, everywhere)?;
                 let served = NetworkStream::start(place, device, plant.clone()).map_err(failed)?;
                 instrument.address = served.address().to_string();
-                embedded.serve(served);
+                emulators.add(served);
             }
             LinkKind::Sysfs => {
                 let served = SysfsFolder::start(device, plant.clone()).map_err(failed)?;
                 instrument.address = served.path().display().to_string();
-                embedded.serve(served);
+                emulators.add(served);
             }
             LinkKind::Scpi | LinkKind::Tcp | LinkKind::Udp => {
                 let served = LineInstrument::new(device, plant.clone());
                 let server =
                     TcpLines::start(socket(&instrument.address, everywhere)?, served).map_err(failed)?;
                 instrument.address = server.address().to_string();
-                embedded.serve(server);
+                emulators.add(server);
             }
         }
         Ok(())
     }
 
     /// Serves the shared places with all their instruments.
-    fn shared(self, all: &mut [&mut InstrumentSetup]) -> Result<Embedded, String> {
-        let (plant, everywhere, mut embedded) = (self.plant, self.everywhere, self.embedded);
+    fn shared(self, all: &mut [&mut InstrumentSetup]) -> Result<Emulators, String> {
+        let (plant, everywhere, mut emulators) = (self.plant, self.everywhere, self.emulators);
         for (address, units) in self.registers {
             let server = ModbusTcpServer::start(socket(&address, everywhere)?, units, plant.clone())
                 .map_err(|error| format!("cannot listen on {address}: {error}"))?;
             for instrument in all.iter_mut().filter(|instrument| instrument.address == address) {
                 instrument.address = server.address().to_string();
             }
-            embedded.modbus_tcp.get_or_insert(server.address());
-            embedded.serve(server);
+            emulators.modbus_tcp.get_or_insert(server.address());
+            emulators.add(server);
         }
         for (mut address, units) in self.lines {
             let port = port(&mut address)?;
             let failed = |error: std::io::Error| format!("{address} cannot be served: {error}");
-            embedded.serve(SerialEmulator::modbus_rtu(port, units, plant.clone()).map_err(failed)?);
+            emulators.add(SerialEmulator::modbus_rtu(port, units, plant.clone()).map_err(failed)?);
         }
         for (interface, devices) in self.buses {
             let bus = KernelCan::open(&interface).map_err(|error| error.to_string())?;
             let emulator = CanEmulator::start(bus, devices, plant.clone());
-            embedded.serve(emulator.map_err(|error| error.to_string())?);
+            emulators.add(emulator.map_err(|error| error.to_string())?);
         }
-        Ok(embedded)
+        Ok(emulators)
     }
 }
 

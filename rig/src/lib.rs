@@ -8,7 +8,7 @@
 //! | [`rig_lock`], [`exposure`] | one controller a rig; a finger's exposure, carried from run to run |
 //! | [`dead_man_key`] | a key held at the terminal, for trials |
 //! | [`mod@bench`] | calibrations with the instruments at hand |
-//! | [`doctor`], [`free_ports`] | the instruments of a setup judged by what a run needs; ports that another program holds |
+//! | [`doctor`], [`free_ports`] | instruments and computer as a run needs them; ports that are in use |
 //! | [`live`] | a run while it goes on: one feed, and viewers that read it |
 //! | [`terminal`], [`watch`] | the terminal taken and given back; the live view on it |
 //! | [`dashboard`] | the rig in a browser: one more viewer (feature `dashboard`) |

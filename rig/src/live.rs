@@ -5,8 +5,8 @@
 //!                    ^ stop, pause, resume, one word a line, of the same user only ----'
 //! ```
 //!
-//! There is one way to look, and it is never in the loop's: the thread that tells the news puts messages into a bounded queue and waits for
-//! nothing. A viewer that reads too slowly is let go, and gets the whole picture when it comes again.
+//! Viewers never hold the loop up: the thread that has the updates puts messages into a bounded queue and
+//! waits for nothing. A viewer that is too slow is disconnected, and gets the whole state when it returns.
 
 mod feed;
 mod message;

@@ -1,13 +1,13 @@
-//! A sweep in wall-clock time. Four threads, each with one duty: the loop; the record's writer; the sweep, which answers
-//! the loop's rows within a millisecond or two; and this one, which makes passes safe on the disk and hands the news on:
-//! what is printed, published or shown has bounded queues and threads of its own. So a slow disk reaches
-//! neither the loop nor the stage, and a reader that takes nothing does not reach this thread.
+//! A sweep in wall-clock time. Four threads, each with one duty: the loop; the record's writer; the sweep, which
+//! answers the loop's rows within a millisecond or two; and this one, which makes passes safe on the disk and
+//! passes updates on: what is printed, published or shown has bounded queues and threads of its own. So a slow
+//! disk reaches neither the loop nor the stage, and a reader that takes nothing does not reach this thread.
 #![allow(clippy::disallowed_methods, reason = "a sweep in wall-clock time, beside the loop")]
 
 mod writer;
 
 use crate::dead_man_key::DeadManKey;
-use crate::emulators::Embedded;
+use crate::emulators::Emulators;
 use crate::exposure::{Keeping, Ledger};
 use crate::rig_lock::RigLock;
 use crate::wall_loop::{Ended, LoopHandle, Parts, WallLoop};
@@ -15,7 +15,7 @@ use miette::{IntoDiagnostic, WrapErr};
 use realtime::clock::Clock;
 use realtime::pacing::{self, Lifeline};
 use realtime::ports::Nanos;
-use realtime::stall_monitor::StallMonitor;
+use realtime::stall_monitor::{StallMonitor, StallReport};
 use realtime::turn::Ports;
 use runs::ambient::{Answers, Bench, World};
 use runs::exposure_left::Left;
@@ -29,7 +29,7 @@ use std::sync::Arc;
 use std::sync::atomic::{AtomicBool, Ordering};
 use std::sync::mpsc::{Receiver, Sender, channel};
 use std::time::Instant;
-use writer::{Entry, Recording};
+use writer::{Entry, Last, Recording, Written};
 
 /// Runs a job: in wall-clock time over its instruments, or in virtual time where the job says so. In
 /// wall-clock time `update` must wait for nothing: whoever keeps the passes calls it.
@@ -56,11 +56,11 @@ fn over_instruments(
     mut job: Job,
     begun: Begun,
     signals: &Signals,
-    news: &mut dyn FnMut(Update<'_>),
+    update: &mut dyn FnMut(Update<'_>),
 ) -> miette::Result<Summary> {
     let Begun { dir, mut sequence, planned, answers, .. } = begun;
     let key = if job.setup.hand_at_key() { Some(DeadManKey::open()?) } else { None };
-    let _claim = RigLock::take(&job.setup)?;
+    let _rig_lock = RigLock::take(&job.setup)?;
     let ledger = Ledger::open(&job.setup, &job.notes)?;
     if let Some(ledger) = &ledger {
         job.setup.config.exposed = ledger.exposed();
@@ -70,7 +70,7 @@ fn over_instruments(
     let simulated = job.setup.file.virtual_rig.is_some();
     let clock = if simulated { Clock::holdable(epoch) } else { Clock::from(epoch) };
     let (origin_ns, start_unix_ns) = (pacing::monotonic_ns(), keeper::unix_ns());
-    let (_embedded, bench, rig) = connect(&job, &sequence, answers, &clock)?;
+    let (_emulators, bench, rig) = connect(&job, &sequence, answers, &clock)?;
     let mut keeper = Keeper::begin(&job, dir, planned)?;
     let file = keeper.new_record()?;
     let preamble = keeper::preamble(&job, start_unix_ns)?;
@@ -94,8 +94,8 @@ fn over_instruments(
 
     let (note_in, notes) = channel();
     let mut unkept = None;
-    let mut keep = |news: &mut dyn FnMut(Update<'_>)| {
-        pass_on(&notes, &mut keeper, &lost, &recording.entries, &mut unkept, news);
+    let mut keep = |update: &mut dyn FnMut(Update<'_>)| {
+        pass_on(&notes, &mut keeper, &lost, &recording.entries, &mut unkept, update);
     };
     let mut snapshots = Snapshots::of(start_unix_ns, job.setup.config.limits.timing.cycle);
     let (life, stop, session) = (rig.life(), handle.stopper(), tracing::Span::current());
@@ -108,7 +108,7 @@ fn over_instruments(
         // The receiver of the updates is foreign code, and may panic where its terminal is gone. Then the rig
         // is stopped before anything else, the measurements are stored, and the panic continues with the rig
         // off.
-        let finished = std::panic::catch_unwind(AssertUnwindSafe(|| keep(news)));
+        let finished = std::panic::catch_unwind(AssertUnwindSafe(|| keep(update)));
         if finished.is_err() {
             stop();
             lost.store(true, Ordering::Relaxed);
@@ -118,69 +118,72 @@ fn over_instruments(
     });
 
     // Whatever ended it: off first.
-    let Ended { report, links, off } = rig.end();
-    let off_reported = std::panic::catch_unwind(AssertUnwindSafe(|| news(Update::Off(&off))));
+    let ended = rig.end();
+    let off_reported = std::panic::catch_unwind(AssertUnwindSafe(|| update(Update::Off(&ended.off))));
     let panicked = panicked.or(off_reported.err());
     drop(held);
     if let Some(keeping) = keeping {
-        keeping.end(off.read_back);
+        keeping.end(ended.off.read_back);
     }
-    let stalls = monitor.finish();
-    let held_back = clock.held_back();
-    let last = [
-        ("loop", serde_json::to_string(&report)),
-        ("stalls", serde_json::to_string(&stalls)),
-        ("links", serde_json::to_string(&links)),
-        ("off", serde_json::to_string(&off)),
-    ];
-    let ended = outcome.iter().map(|outcome| ("outcome", serde_json::to_string(outcome)));
-    let last = ended.chain(last).map(|(name, text)| Ok((name.to_string(), text.into_diagnostic()?)));
-    let written = recording.end(last.collect::<miette::Result<_>>()?);
+    let (stalls, held_back) = (monitor.finish(), clock.held_back());
+    let written = recording.end(last_words(&outcome, &stalls, &ended)?);
+    let Ended { report, links, off } = ended;
     if let Some(panic) = panicked {
         tracing::error!("{}", off.words());
         std::panic::resume_unwind(panic);
     }
-    let ended = outcome.and_then(|outcome| Ok((outcome, written?, report)));
-    let (outcome, written, report) = match ended {
-        Ok((outcome, written, Some(report))) => (outcome, written, report),
-        Ok((.., None)) => {
-            return Err(fault("the loop's thread is stuck inside a driver").wrap_err(off.words()));
-        }
-        Err(fault) => return Err(fault.wrap_err(off.words())),
-    };
+    let stuck = || fault("the loop's thread is stuck inside a driver");
+    let ended = outcome.and_then(|outcome| Ok((outcome, written?, report.ok_or_else(stuck)?)));
+    let (outcome, written, report) = ended.map_err(|fault| fault.wrap_err(off.words()))?;
     if let Some(what) = &report.panicked {
         tracing::error!(what, "a port panicked in the loop: the rig was stopped");
     }
-    for why in written.problem.iter().cloned().chain(unkept.map(|e| format!("{e:#}"))) {
-        tracing::error!(why, "the record could not be saved: the sweep was stopped");
-    }
-    // A file that failed only while the last rows went into it: the sweep was over, but it is not recorded.
-    let unrecorded = written.problem.is_some() && outcome == Outcome::Complete;
-    let outcome = if unrecorded { Outcome::RecordLost } else { outcome };
+    let outcome = as_recorded(outcome, &written, unkept);
     let record_lost = written.lost_rows + report.ring_drops;
     let agreement = sequence.agreement(outcome == Outcome::Complete);
     Ok(keeper.end(outcome, agreement, Some((report, stalls, held_back)), record_lost, links, off))
 }
 
+/// What the record ends with, by name, as JSON.
+fn last_words(outcome: &miette::Result<Outcome>, stalls: &StallReport, of: &Ended) -> miette::Result<Last> {
+    let last = [
+        ("loop", serde_json::to_string(&of.report)),
+        ("stalls", serde_json::to_string(stalls)),
+        ("links", serde_json::to_string(&of.links)),
+        ("off", serde_json::to_string(&of.off)),
+    ];
+    let ended = outcome.iter().map(|outcome| ("outcome", serde_json::to_string(outcome)));
+    ended.chain(last).map(|(name, text)| Ok((name.to_string(), text.into_diagnostic()?))).collect()
+}
+
+/// The outcome, `RecordLost` where the last rows did not reach the file; logs why the record was lost.
+fn as_recorded(outcome: Outcome, written: &Written, unkept: Option<miette::Report>) -> Outcome {
+    for why in written.problem.iter().cloned().chain(unkept.map(|e| format!("{e:#}"))) {
+        tracing::error!(why, "the record could not be saved: the sweep was stopped");
+    }
+    let lost = written.problem.is_some() && outcome == Outcome::Complete;
+    if lost { Outcome::RecordLost } else { outcome }
+}
+
 /// A virtual rig's instruments as they are served, what is beside the rig, and its ports.
-type Connected = (Option<(Embedded, SharedPlant)>, Bench, drivers::Rig);
+type Connected = (Option<(Emulators, SharedPlant)>, Bench, drivers::Rig);
 
 /// Serves the virtual rig where the setup has one, and opens the instruments.
 fn connect(job: &Job, sequence: &Sequence, answers: Answers, clock: &Clock) -> miette::Result<Connected> {
     let mut instruments = job.setup.instruments();
-    let mut embedded = None;
+    let mut emulators = None;
     if job.setup.file.virtual_rig.is_some() {
         // The real places are put into the setup's.
         let plant = SharedPlant::new(sim::wire::world::WorldPlant::new(job.world()?), clock.clone());
-        let served = crate::emulators::embed(&mut instruments, &plant, false);
-        embedded = Some((served.map_err(|problem| miette::miette!("{problem}"))?, plant));
+        let served = crate::emulators::serve(&mut instruments, &plant, false);
+        emulators = Some((served.map_err(|problem| miette::miette!("{problem}"))?, plant));
     }
-    let air = embedded.as_ref().map(|(_, plant)| World::Served(plant.clone()));
+    let air = emulators.as_ref().map(|(_, plant)| World::Served(plant.clone()));
     let bench = Bench::open(sequence, instruments.chamber.as_ref(), air, answers)?;
     let rig = drivers::open(&instruments, clock.clone()).map_err(|e| {
         miette::miette!(help = "check address, wiring and power; 'muprime doctor --setup' says more", "{e}")
     })?;
-    Ok((embedded, bench, rig))
+    Ok((emulators, bench, rig))
 }
 
 /// What the sweep has to keep and to tell.
@@ -247,20 +250,20 @@ fn pass_on(
     lost: &AtomicBool,
     entries: &Sender<Entry>,
     unkept: &mut Option<miette::Report>,
-    news: &mut dyn FnMut(Update<'_>),
+    update: &mut dyn FnMut(Update<'_>),
 ) {
     for note in notes {
         // Passes that come until the sweep has stopped are stored if possible.
-        if let Err(why) = keeper.keep(&note.events, note.pass.as_ref(), news) {
+        if let Err(why) = keeper.keep(&note.events, note.pass.as_ref(), update) {
             lost.store(true, Ordering::Relaxed);
             unkept.get_or_insert(why);
         }
         if note.pass.is_some() {
             let (done, all, left_s) = note.progress;
-            news(Update::Progress(done, all, left_s));
+            update(Update::Progress(done, all, left_s));
         }
         if let Some(snapshot) = &note.state {
-            news(Update::State(snapshot));
+            update(Update::State(snapshot));
         }
         if note.pass.is_some() || !note.events.is_empty() {
             let _ = entries.send((note.at, note.events, note.pass));

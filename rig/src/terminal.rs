@@ -20,7 +20,7 @@ const LEAVE: &[u8] = b"\x1b[0m\x1b[?25h\x1b[?1049l";
 /// A terminal that takes nothing for so long keeps nobody from leaving.
 const PATIENCE: Duration = Duration::from_millis(500);
 /// Who waits for keys looks this often whether it is to end.
-const LOOK_EVERY: Timespec = Timespec { tv_sec: 0, tv_nsec: 50_000_000 };
+const POLL_EVERY: Timespec = Timespec { tv_sec: 0, tv_nsec: 50_000_000 };
 
 /// How the terminal was before. Whoever gives it back takes it out.
 static BEFORE: Mutex<Option<Termios>> = Mutex::new(None);
@@ -86,7 +86,7 @@ pub fn listen(ctrl_c: CtrlC) -> Result<(), String> {
 pub fn keys(into: &mut [u8]) -> io::Result<usize> {
     let input = stdin();
     let mut looked = [PollFd::new(&input, PollFlags::IN)];
-    match poll(&mut looked, Some(&LOOK_EVERY)) {
+    match poll(&mut looked, Some(&POLL_EVERY)) {
         // A signal came between: nothing was pressed.
         Ok(0) | Err(rustix::io::Errno::INTR) => return Ok(0),
         Ok(_) => {}

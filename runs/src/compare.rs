@@ -5,9 +5,9 @@
 //! for the references of both runs. Calibration that both runs share (gains, stiffnesses) cancels in a difference and is left out.
 
 use crate::ambient::{OfAir, Tolerances, air_words, values};
-use crate::report::RunData;
-use crate::report::human::{p_value, quantity};
+use crate::human::{p_value, quantity};
 use crate::report::levels;
+use crate::run_data::RunData;
 use crate::sequence::MeasuredPass;
 use models::condition::Ambient;
 use models::pass::{Pass, REVERSED, coulomb_coefficient};

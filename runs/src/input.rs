@@ -1,6 +1,6 @@
 //! Reading files that people wrote: every refusal shows the place in the file and what would do.
 
-use crate::report::human::rounded;
+use crate::human::rounded;
 use miette::{Diagnostic, NamedSource, SourceSpan};
 use models::rig_file::{RigFile, RigFileError};
 use serde::de::DeserializeOwned;

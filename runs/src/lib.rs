@@ -2,11 +2,12 @@
 //!
 //! No instrument and no loop in wall-clock time is here: the crate `rig` runs the same sweep over
 //! instruments. Downstream: `input` -> `setup`, `plan` -> `certificates` -> `sequence`, `supervisor` ->
-//! `session` -> `run_dir` -> `report`.
+//! `session` -> `run_dir` -> `run_data` -> `report`.
 //!
 //! | module | purpose |
 //! |---|---|
 //! | [`input`], [`quantity`], [`files`] | files of people, refused with their place; units; files that are written |
+//! | [`human`] | quantities as people read them |
 //! | [`mod@print`], [`leave`], [`version`] | how the program prints, and ends; the build and its models |
 //! | [`setup`], [`plan`], [`fingertip`] | rigs, plans, fingertips, all checked with the place in the file |
 //! | [`bundled`] | those that come with the program, by name |
@@ -18,7 +19,7 @@
 //! | [`supervisor`] | the one way to lead a loop: stop first, switch off, read back; and the loop in virtual time |
 //! | [`session`] | a sweep from its job to its summary, in virtual time |
 //! | [`ambient`], [`exposure_left`] | levels of the air, set and read; what is left of a finger's exposure |
-//! | [`run_dir`], [`catalogue`] | a run's folder and its reader; the list of runs |
+//! | [`run_dir`], [`run_data`], [`catalogue`] | a run's folder; the run as read from there; the list of runs |
 //! | [`report`], [`compare`], [`fidelity`] | pages; runs side by side; how faithfully a target was rendered |
 //! | [`verdict`] | a verdict for people at a terminal, and the plan of the next experiment |
 //!
@@ -47,6 +48,7 @@ pub mod exposure_left;
 pub mod fidelity;
 pub mod files;
 pub mod fingertip;
+pub mod human;
 pub mod input;
 pub mod leave;
 pub mod model_file;
@@ -55,6 +57,7 @@ pub mod print;
 pub mod quantity;
 pub mod rehearsal;
 pub mod report;
+pub mod run_data;
 pub mod run_dir;
 pub mod sequence;
 pub mod session;

@@ -4,12 +4,11 @@
 //!
 //! | module | part of a page |
 //! |---|---|
-//! | `page`, [`about`], [`events`], [`traces`], [`fidelity`], `explore` | a run |
+//! | `page`, [`events`], [`traces`], [`fidelity`], `explore` | a run |
 //! | [`diagnosis`] | a verdict; law figure: `diagnosis/law` and `plots/verdict` |
 //! | [`comparison`], [`groups`] | two runs, more |
-//! | [`plots`], [`published`], [`mod@html`], [`human`], `levels` | figures, published values, text, quantities, levels |
+//! | [`plots`], [`published`], [`mod@html`], `levels` | figures, published values, text, levels |
 
-pub mod about;
 pub mod comparison;
 pub mod diagnosis;
 pub mod events;
@@ -17,100 +16,20 @@ mod explore;
 pub mod fidelity;
 pub mod groups;
 pub mod html;
-pub mod human;
 pub mod levels;
 mod page;
 pub mod plots;
 pub mod published;
 pub mod traces;
 
-use crate::run_dir::{differences, missing_records, of_record, open_record, passes_in, records_in};
-use crate::sequence::MeasuredPass;
-use crate::session::Summary;
-use models::finger::Finger;
-use realtime::recorder::{self, Entry};
-use std::collections::BTreeMap;
+use crate::run_data::read;
 use std::path::Path;
 
 pub use explore::{EXPLORE, FIGURES, UPLOT, UPLOT_STYLE};
 pub use html::{escape, scoped_style};
 
-/// Everything a report is made of, read from a run's folder.
-pub struct RunData {
-    /// What is known of the run, for the top of a page.
-    pub about: Vec<(&'static str, String)>,
-    /// Facts of the record's first words.
-    pub facts: BTreeMap<String, String>,
-    /// Files that the record holds, by name: setup, plan, rig.toml, certificates, model, profiles.
-    pub files: BTreeMap<String, Vec<u8>>,
-    /// The passes with their comparisons.
-    pub passes: Vec<MeasuredPass>,
-    /// Events with loop time in s.
-    pub events: Vec<(f64, serde_json::Value)>,
-    /// How it ended; `None` for a run that was killed or is still going.
-    pub summary: Option<Summary>,
-    /// The finger of rig.toml.
-    pub finger: Finger,
-    /// How faithfully it rendered its target; none of a run that rendered nothing.
-    pub fidelity: Option<crate::fidelity::Fidelity>,
-    /// What is damaged or missing in the run's folder.
-    pub damage: Vec<String>,
-}
-
-impl RunData {
-    /// `Psi*` of the passes, as the summary has it.
-    pub fn psi_star(&self) -> Option<models::psi_star::PsiStar> {
-        self.summary.as_ref()?.psi_star
-    }
-}
-
-/// Reads a run's folder.
-pub fn read(folder: &Path) -> miette::Result<RunData> {
-    let passes = passes_in(folder)?;
-    let mut facts = BTreeMap::new();
-    let mut files = BTreeMap::new();
-    let mut events = Vec::new();
-    let mut damage = missing_records(folder)?;
-    for path in records_in(folder)? {
-        let mut start = 0u64;
-        // Entry by entry: the rows of hours would not fit into memory.
-        let mut reader = open_record(&path, recorder::EVENTS)?;
-        for entry in &mut reader {
-            match entry {
-                Entry::Facts { name, facts: found } if name == recorder::HEADER => {
-                    start = found.get("start_unix_ns").and_then(|s| s.parse().ok()).unwrap_or(0);
-                    facts = found;
-                }
-                Entry::Message { log_time, text, .. } => {
-                    if let Ok(event) = serde_json::from_slice(&text) {
-                        events.push((log_time.saturating_sub(start) as f64 * 1e-9, event));
-                    }
-                }
-                Entry::File { name, bytes, .. } => drop(files.insert(name, bytes)),
-                Entry::Facts { .. } => {}
-            }
-        }
-        damage.extend(of_record(&path, reader.integrity().clone()));
-    }
-    damage.extend(differences(folder, &passes)?);
-    let summary =
-        std::fs::read(folder.join("summary.json")).ok().and_then(|b| serde_json::from_slice(&b).ok());
-    let rig = crate::input::rig_file(&folder.join("rig.toml"))?;
-    let about = about::of_run(folder, &facts, Some(&rig));
-    let fidelity = crate::fidelity::read(folder);
-    Ok(RunData { about, facts, files, passes, events, summary, finger: rig.finger, fidelity, damage })
-}
-
-/// The report of a run as HTML.
-pub fn html(folder: &Path) -> miette::Result<String> {
-    Ok(html_and_damage(folder, &[])?.0)
-}
-
-/// The same with published values on its axes, and what is damaged or missing in the folder.
-pub fn html_and_damage(
-    folder: &Path,
-    overlay: &[published::Published],
-) -> miette::Result<(String, Vec<String>)> {
+/// The report of a run as HTML, with published values on its axes; and what is damaged in the folder.
+pub fn html(folder: &Path, overlay: &[published::Published]) -> miette::Result<(String, Vec<String>)> {
     let run = read(folder)?;
     Ok((page::page(&run, &traces::of(folder)?, overlay)?, run.damage))
 }

@@ -1,4 +1,4 @@
-//! A run's folder: the record, the point table, rig.toml, the report; and how a killed run is taken up again.
+//! A run's folder: the record, the point table, rig.toml, the report; and how a killed run is resumed.
 //!
 //! A pass is acknowledged (on stdout) only after its line is in `points.csv` and synced. Errors are
 //! those of the file system, where no others are stated.
@@ -28,7 +28,7 @@ use std::fs::{self, File, OpenOptions};
 use std::io::{BufReader, Write};
 use std::path::{Path, PathBuf};
 
-/// What a run is of: written when it begins, compared when it is taken up again.
+/// What a run is of: written when it begins, compared when it is resumed.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct Identity {

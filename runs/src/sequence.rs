@@ -1,11 +1,12 @@
 //! The order of a sweep: a pure state machine over rows, beside the loop, in virtual and wall-clock time.
-//! How long a pass settles and measures is `plan::PassTimes`; arming, zero, approach, pause are constants.
+//! The times of a pass are those of `plan::PassTimes`, and the longest pause is the setup's `pause_max_s`;
+//! the times of arming, zero and approach are constants.
 //!
 //! ```text
-//! Arm -> Zero -> [ Approach -> Settle -> Measure ]* -> Zero -> Done
-//!  any -> Failed(trip)      Stopped by request at any time
+//! Arm -> Zero -> [ Approach -> Settle -> Measure (-> Edges) ]* -> Zero -> Over
+//!  any -> Over    by a trip, or a stop by request
 //!  before a pass: Paused, by request; disarmed, and armed again when it is to go on
-//!  before the first, before one whose level of the air is not there, after the last: at the rig (see `at_rig`)
+//!  before the first, before one whose level of the air is not there, after the last: AtRig (see `at_rig`)
 //! ```
 
 mod arming;
@@ -479,7 +480,7 @@ impl Sequence {
         let velocity = (away * self.approach.gain).clamp(-fast, fast);
         let velocity = if velocity.abs() < 2e-3 { 2e-3 * away.signum() } else { velocity };
         let request = Request { velocity_m_s: velocity, ..Request::default() };
-        // Only news goes to the loop, and not more often than it can matter.
+        // Only changes go to the loop, and not more often than it can matter.
         if !self.started || row.cycle.is_multiple_of(self.approach.every) {
             self.started = true;
             out.commands.push(Command::Set(request, self.marker(Phase::Approach)));

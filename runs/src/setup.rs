@@ -18,7 +18,7 @@ use drivers::{InstrumentSetup, InstrumentsSetup};
 use models::condition::Ambient;
 use models::rig_file::{PassNoise, RigFile, RigFileError};
 use realtime::cycle::Config;
-use realtime::estimate::EstimateConfig;
+use realtime::estimate::{EstimateConfig, WINDOW_MAX};
 use realtime::pacing::Pacing;
 use realtime::ports::Nanos;
 use realtime::safety::Exposed;
@@ -109,6 +109,46 @@ impl SetupFile {
             ambient_pressure_pa: self.ambient_pressure_pa,
             temperature_c: self.temperature_c,
             relative_humidity_pct: self.relative_humidity_pct,
+        }
+    }
+
+    /// Judges rate, priority, spinning and CPU of the loop; says whether the rate is one at which it can run.
+    fn check_loop(&self, wrong: &mut Problems<'_>) -> bool {
+        let Pace { rate_hz, priority, cpu, spin_us, .. } = self.pace;
+        let mut add = |key, problem: String, remedy| wrong.add(&["loop", key], problem, remedy);
+        let loops = (10.0..=4000.0).contains(&rate_hz);
+        if !loops {
+            let remedy = unit_meant("rate_hz", rate_hz, [10.0, 4000.0]);
+            add("rate_hz", format!("rate_hz = {rate_hz}: the loop runs at 10 to 4000 Hz"), remedy);
+        }
+        if !(0..=98).contains(&priority) {
+            add("priority", "a priority is 0 (none) to 98".into(), None);
+        }
+        let half_period_us = 0.5e6 / rate_hz;
+        if loops && !(0.0..=half_period_us).contains(&spin_us) {
+            add("spin_us", format!("spin_us = {spin_us}: 0 to {half_period_us} (half a period)"), None);
+        }
+        if let Some(cpu) = cpu.filter(|cpu| *cpu >= MOST_CPUS) {
+            add("cpu", format!("cpu = {cpu}: they are counted from 0 to {}", MOST_CPUS - 1), None);
+        }
+        loops
+    }
+
+    /// Judges the numbers of `[estimate]` and `[noise]`.
+    fn check_noise(&self, wrong: &mut Problems<'_>) {
+        if !(1..=WINDOW_MAX).contains(&self.estimate.window) {
+            wrong.add(&["estimate", "window"], format!("a window has 1 to {WINDOW_MAX} samples"), None);
+        }
+        for (table, name, value) in [
+            ("noise", "pass_relative_sd", self.noise.pass_relative_sd),
+            ("noise", "force_sd_n", self.noise.force_sd_n),
+            ("estimate", "normal_force_min_n", self.estimate.normal_force_min_n),
+            ("estimate", "sample_sd_n", self.estimate.sample_sd_n),
+        ] {
+            if !(value.is_finite() && value > 0.0) {
+                let problem = format!("{name} = {value}: a finite number above zero is needed");
+                wrong.add(&[table, name], problem, None);
+            }
         }
     }
 }
@@ -244,46 +284,8 @@ impl Setup {
         let mut file: SetupFile = input::parse_toml(origin, text)?;
         file.pace.keep_cpus_awake.get_or_insert(file.virtual_rig.is_none());
         let mut wrong = Problems::of(origin, text);
-        let rate_hz = file.pace.rate_hz;
-        let loops = (10.0..=4000.0).contains(&rate_hz);
-        if !loops {
-            let remedy = unit_meant("rate_hz", rate_hz, [10.0, 4000.0]);
-            wrong.add(
-                &["loop", "rate_hz"],
-                format!("rate_hz = {rate_hz}: the loop runs at 10 to 4000 Hz"),
-                remedy,
-            );
-        }
-        if !(0..=98).contains(&file.pace.priority) {
-            wrong.add(&["loop", "priority"], "a priority is 0 (none) to 98", None);
-        }
-        let half_period_us = 0.5e6 / rate_hz;
-        if loops && !(0.0..=half_period_us).contains(&file.pace.spin_us) {
-            let problem = format!("spin_us = {}: 0 to {half_period_us} (half a period)", file.pace.spin_us);
-            wrong.add(&["loop", "spin_us"], problem, None);
-        }
-        if let Some(cpu) = file.pace.cpu.filter(|cpu| *cpu >= MOST_CPUS) {
-            wrong.add(
-                &["loop", "cpu"],
-                format!("cpu = {cpu}: they are counted from 0 to {}", MOST_CPUS - 1),
-                None,
-            );
-        }
-        if !(1..=realtime::estimate::WINDOW_MAX).contains(&file.estimate.window) {
-            let most = realtime::estimate::WINDOW_MAX;
-            wrong.add(&["estimate", "window"], format!("a window has 1 to {most} samples"), None);
-        }
-        for (table, name, value) in [
-            ("noise", "pass_relative_sd", file.noise.pass_relative_sd),
-            ("noise", "force_sd_n", file.noise.force_sd_n),
-            ("estimate", "normal_force_min_n", file.estimate.normal_force_min_n),
-            ("estimate", "sample_sd_n", file.estimate.sample_sd_n),
-        ] {
-            if !(value.is_finite() && value > 0.0) {
-                let problem = format!("{name} = {value}: a finite number above zero is needed");
-                wrong.add(&[table, name], problem, None);
-            }
-        }
+        let loops = file.check_loop(&mut wrong);
+        file.check_noise(&mut wrong);
         // A world that cannot be is refused here, not by the run that would need it.
         if let Some(rig) = &file.virtual_rig
             && let Err(problem) = sim::world::World::new(&rig.world(), rig.finger_seed)
@@ -303,7 +305,7 @@ impl Setup {
         }
         let limits = if loops && described {
             let person = guards::person(&file, tip.as_ref());
-            limits::all_of(&file, person, Nanos((1e9 / rate_hz).round() as u64), &mut wrong)
+            limits::all_of(&file, person, Nanos((1e9 / file.pace.rate_hz).round() as u64), &mut wrong)
         } else {
             None
         };

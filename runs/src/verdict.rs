@@ -3,7 +3,7 @@
 pub mod edges;
 pub mod files;
 
-use crate::report::human::{quantity, with_interval};
+use crate::human::{quantity, with_interval};
 use diagnosis::certificates;
 pub(crate) use diagnosis::describe::plain;
 use diagnosis::describe::probability;

@@ -35,7 +35,7 @@ left_out!(hdf5 without "matlab");
 left_out!(parquet without "parquet");
 
 use clap::ValueEnum;
-use runs::report::RunData;
+use runs::run_data::RunData;
 use std::path::{Path, PathBuf};
 
 /// A format to export to. Add one: a file in `export/`, a variant, and a line in [`export`].

@@ -1,7 +1,7 @@
 //! The dashboard, with the real program, a real Chromium, an attacker, and the client libraries of Foxglove
 //! and Prometheus.
 //!
-//! Where only what is shown matters, the run is one in virtual time whose news are held back to the pace of a
+//! Where only what is shown matters, the run is one in virtual time whose updates are held back to the pace of a
 //! clock: no busy machine trips it. `MUPRIME_PAGES=FOLDER` keeps the pictures there;
 //! `MUPRIME_DASHBOARD_SOAK_S=449` makes the soak as long as that; the run takes some eight minutes.
 
@@ -201,7 +201,7 @@ fn read_all(
 }
 
 /// Six that read, a slow one and one that reads nothing: the run goes on, the server stays small, the slow one is told fewer states and no
-/// fewer passes, the deaf one is let go, and whoever comes again sees all. Ten times as fast as a clock, so that what waits is much.
+/// fewer passes, the deaf one is disconnected, and whoever comes again sees all. Ten times as fast as a clock, so that what waits is much.
 #[test]
 fn viewers_that_do_not_read_hold_nobody_up() {
     let seconds: u64 = std::env::var("MUPRIME_DASHBOARD_SOAK_S").map_or(20, |s| s.parse().unwrap());
@@ -234,6 +234,6 @@ fn viewers_that_do_not_read_hold_nobody_up() {
         let mut held = Vec::new();
         let _ = deaf.read_to_end(&mut held);
         let held = String::from_utf8_lossy(&held).matches("\"about\"").count();
-        assert!(held < told[0].states / 2, "the deaf one is let go: {held} messages were held for it");
+        assert!(held < told[0].states / 2, "the deaf one is disconnected: {held} messages were held for it");
     }
 }

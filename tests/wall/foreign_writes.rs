@@ -87,7 +87,7 @@ struct Driven {
     _rig: WallLoop,
     reins: LoopHandle,
     plant: SharedPlant,
-    _emulators: rig::emulators::Embedded,
+    _emulators: rig::emulators::Emulators,
 }
 
 impl Driven {
@@ -97,7 +97,7 @@ impl Driven {
         let (epoch, origin_ns) = (Instant::now(), realtime::pacing::monotonic_ns());
         let plant = SharedPlant::new(WorldPlant::new(World::new(&WorldConfig::ideal(), 1).unwrap()), epoch);
         let mut instruments = setup.instruments();
-        let emulators = rig::emulators::embed(&mut instruments, &plant, false).unwrap();
+        let emulators = rig::emulators::serve(&mut instruments, &plant, false).unwrap();
         let opened = drivers::open(&instruments, epoch).map_err(|e| e.to_string())?;
         let mut config = setup.config;
         // The generator has neither watchdog nor relay here: what it shows is looked at, not how it is armed.

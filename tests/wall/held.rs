@@ -78,9 +78,9 @@ fn one_foreign_instrument_lets_the_clock_of_the_whole_rig_run() {
     let (mut own, mut foreign) = (setup.instruments(), setup.instruments());
     let epoch = Instant::now();
     let clock = Clock::holdable(epoch);
-    let _embedded =
-        rig::emulators::embed(&mut own, &SharedPlant::new(world(), clock.clone()), false).unwrap();
-    let _elsewhere = rig::emulators::embed(&mut foreign, &SharedPlant::new(world(), epoch), false).unwrap();
+    let _emulators =
+        rig::emulators::serve(&mut own, &SharedPlant::new(world(), clock.clone()), false).unwrap();
+    let _elsewhere = rig::emulators::serve(&mut foreign, &SharedPlant::new(world(), epoch), false).unwrap();
     let rig = wall::bench::opened(&own, clock.clone());
     assert!(rig.links.clock().held_back().is_some(), "all its instruments are served here");
     drop(rig);

@@ -73,7 +73,7 @@ fn the_loops_thread_allocates_nothing_behind_real_drivers() {
     let world = sim::world::World::new(&WorldConfig::ideal(), 1).unwrap();
     let plant = sim::wire::SharedPlant::new(sim::wire::world::WorldPlant::new(world), epoch);
     let mut instruments = setup.instruments();
-    let _emulators = rig::emulators::embed(&mut instruments, &plant, false).unwrap();
+    let _emulators = rig::emulators::serve(&mut instruments, &plant, false).unwrap();
     let opened = wall::bench::opened(&instruments, epoch);
     let counted = Arc::new(AtomicU64::new(u64::MAX));
     let mut ports = setup.certificates.applied(Ports::new(opened.force, opened.amplifier, opened.stage));

@@ -4,7 +4,7 @@ use super::prelude::*;
 use calibration::certificate::{Certificate, ReadError};
 use rig::bench::AtTheBench;
 use runs::calibrate::{Issued, What, certified, verify};
-use runs::report::human::{number, with_uncertainty};
+use runs::human::{number, with_uncertainty};
 
 #[derive(Debug, clap::Args)]
 pub struct Args {

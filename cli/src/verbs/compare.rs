@@ -5,8 +5,8 @@ use runs::ambient::air_words;
 use runs::compare::Compared;
 use runs::compare::differences::Difference;
 use runs::compare::groups::{GroupBy, Grouped, MOST_COMPARED};
+use runs::human;
 use runs::print::folded;
-use runs::report::human;
 use std::fmt::Write;
 
 /// Most conditions in the table, those furthest apart first.

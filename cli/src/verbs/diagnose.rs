@@ -19,7 +19,7 @@ use tables::verdict::{self, Subject};
 /// Parts of the operating space that are printed, the largest first.
 const PRINTED: usize = 6;
 
-/// Say where simulation and reality part on a table of passes, which effect causes it, and how far it shrinks.
+/// Say where simulation and reality differ on a table of passes, which effect causes it, and how far it shrinks.
 #[derive(Debug, clap::Args)]
 pub struct Args {
     /// A point table (CSV or Parquet), or a run's folder with points.csv and rig.toml.

@@ -42,7 +42,7 @@ pub fn run(args: Args, json: bool) -> miette::Result<ExitCode> {
         true => runs::fidelity::write(&args.run)?,
         false => None,
     };
-    let (html, damage) = runs::report::html_and_damage(&args.run, &overlay?.concat())?;
+    let (html, damage) = runs::report::html(&args.run, &overlay?.concat())?;
     let out = args.out.unwrap_or_else(|| args.run.join("report.html"));
     runs::files::write_output(&out, html)?;
     if json {

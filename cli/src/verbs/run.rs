@@ -159,9 +159,9 @@ fn measure(job: Job, planned: usize, args: &Args, json: bool) -> miette::Result<
     let mut followers = Followers::begin(&job, planned, args, json)?;
     let before = runs::run_dir::passes_in(&job.out).unwrap_or_default();
     let mut feed = Feed::new(live::Run::of(&job, planned, before.len()), before, &signals);
-    let summary = rig::session::run(job, &signals, &mut |news| {
-        feed.news(&news);
-        followers.news(&news);
+    let summary = rig::session::run(job, &signals, &mut |update| {
+        feed.update(&update);
+        followers.update(&update);
     });
     let bar = followers.bar.clone();
     print::draw("", move || bar.finish_and_clear());
@@ -199,7 +199,7 @@ fn keys_are_free(job: &Job, tui: bool) -> miette::Result<()> {
     Ok(())
 }
 
-/// Where the news of one run go: the terminal or a program, and a broker.
+/// Where the updates of one run go: the terminal or a program, and a broker.
 struct Followers {
     json: bool,
     planned: usize,
@@ -244,8 +244,8 @@ impl Followers {
         }
     }
 
-    fn news(&mut self, news: &Update<'_>) {
-        match news {
+    fn update(&mut self, update: &Update<'_>) {
+        match update {
             Update::Pass(pass) => {
                 self.publish("pass", |_| json!(pass));
                 if self.json {
@@ -377,7 +377,7 @@ fn progress_bar(json: bool, planned: u64) -> ProgressBar {
 }
 
 fn tell(summary: &Summary, json: bool) {
-    let remarked = runs::report::about::Remarked::of(summary);
+    let remarked = runs::run_data::about::Remarked::of(summary);
     if json {
         answer_json(&json!({ "summary": remarked }));
         return;

@@ -72,17 +72,17 @@ pub fn run(args: Args, json: bool) -> miette::Result<ExitCode> {
             args.modbus_tcp
         );
     }
-    let mut embedded =
-        rig::emulators::embed(&mut instruments, &plant, true).map_err(|e| miette::miette!("{e}"))?;
+    let mut emulators =
+        rig::emulators::serve(&mut instruments, &plant, true).map_err(|e| miette::miette!("{e}"))?;
     let mut vibrometer = setup.file.vibrometer.clone();
     let served = vibrometer.as_mut().map(|v| rig::emulators::vibrometer(v, &plant)).transpose();
     let served = served.map_err(|e| miette::miette!("{e}"))?;
-    embedded.places.extend(vibrometer.map(|v| format!("{} at {}", v.profile, v.address)));
-    let modbus_tcp = embedded.modbus_tcp.map(|address| address.to_string());
+    emulators.places.extend(vibrometer.map(|v| format!("{} at {}", v.profile, v.address)));
+    let modbus_tcp = emulators.modbus_tcp.map(|address| address.to_string());
     if json {
-        answer_json(&json!({ "modbus_tcp": modbus_tcp, "instruments": embedded.places }));
+        answer_json(&json!({ "modbus_tcp": modbus_tcp, "instruments": emulators.places }));
     } else {
-        embedded.places.iter().for_each(|place| say!("{place}"));
+        emulators.places.iter().for_each(|place| say!("{place}"));
         let listens =
             modbus_tcp.map(|address| format!("listens on {address} (Modbus TCP)")).unwrap_or("runs".into());
         say!("the virtual rig {listens}; Ctrl-C ends it");
@@ -98,7 +98,7 @@ pub fn run(args: Args, json: bool) -> miette::Result<ExitCode> {
         signal_hook::iterator::Signals::new([signal_hook::consts::SIGINT, signal_hook::consts::SIGTERM])
             .into_diagnostic()?;
     let _ = signals.forever().next();
-    drop((line, embedded, served));
+    drop((line, emulators, served));
     exit(DONE)
 }
 

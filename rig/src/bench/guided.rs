@@ -29,12 +29,12 @@ pub fn series(way: &SeriesOptions<'_>) -> miette::Result<String> {
     }
     let epoch = Instant::now();
     // Closing the links switches off what they reach: that must be nobody else's rig.
-    let mut _claim = None;
+    let mut _rig_lock = None;
     let mut rig = match way.setup {
         None => None,
         Some(name) => {
             let setup = Setup::load(name)?;
-            _claim = Some(crate::rig_lock::RigLock::take(&setup)?);
+            _rig_lock = Some(crate::rig_lock::RigLock::take(&setup)?);
             Some(drivers::open(&setup.instruments(), epoch).map_err(|e| miette::miette!("{e}"))?)
         }
     };

@@ -22,7 +22,7 @@ use std::sync::mpsc::{Receiver, RecvTimeoutError, sync_channel};
 use std::time::Duration;
 
 /// How often a wait for an answer looks whether the operator has ended it otherwise.
-const LOOK_EVERY: Duration = Duration::from_millis(20);
+const POLL_EVERY: Duration = Duration::from_millis(20);
 
 /// Drives the set-points and asks for the readings; the table as CSV, with the settings at its head.
 ///
@@ -33,7 +33,7 @@ pub fn table(setup: &Setup, table: &LiveTable<'_>) -> miette::Result<String> {
     check(setup, table)?;
     let settings = AtTheBench.vibrometer(setup, table.frequency_hz)?;
     say!("vibrometer: {settings}");
-    let _claim = RigLock::take(setup)?;
+    let _rig_lock = RigLock::take(setup)?;
     let drive = Drive::start(setup)?;
     let taken = take(table, &drive, &settings);
     // Whatever became of the table: off first, and its report was read back.
@@ -111,7 +111,7 @@ fn lines_of_stdin() -> miette::Result<Receiver<std::io::Result<String>>> {
 fn answer(lines: &Receiver<std::io::Result<String>>, drive: &Drive) -> miette::Result<String> {
     loop {
         drive.go_on()?;
-        match lines.recv_timeout(LOOK_EVERY) {
+        match lines.recv_timeout(POLL_EVERY) {
             Ok(line) => return line.map_err(|e| miette::miette!("the terminal: {e}")),
             Err(RecvTimeoutError::Timeout) => {}
             Err(RecvTimeoutError::Disconnected) => {

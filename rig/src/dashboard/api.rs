@@ -158,8 +158,8 @@ async fn run(State(shared): Server, Path(name): Path<String>) -> Answer {
 
 async fn report(State(shared): Server, Path(name): Path<String>) -> Answer {
     let folder = folder(&shared, &name)?;
-    let found = beside(move || runs::report::html(&folder)).await?;
-    Ok(found.map_or_else(|why| failed_to(&why), html))
+    let found = beside(move || runs::report::html(&folder, &[])).await?;
+    Ok(found.map_or_else(|why| failed_to(&why), |(page, _)| html(page)))
 }
 
 /// A window of a run's loop time, s.

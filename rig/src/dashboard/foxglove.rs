@@ -28,8 +28,8 @@ use tokio::sync::mpsc::{Receiver, Sender};
 const PROTOCOLS: [&str; 2] = ["foxglove.sdk.v1", "foxglove.websocket.v1"];
 /// Largest message from a client in bytes: subscriptions to all topics are some kilobytes.
 const LARGEST: usize = 64 * 1024;
-/// Time between two looks for a live run.
-const LOOK_EVERY: Duration = Duration::from_millis(500);
+/// Time between two polls for a live run.
+const POLL_EVERY: Duration = Duration::from_millis(500);
 /// First byte of a binary message with data.
 const MESSAGE_DATA: u8 = 1;
 
@@ -72,7 +72,7 @@ fn hear(shared: &Shared, name: Option<&str>, to: &Sender<Message>) {
         if let Some(run) = name.map(String::from).or_else(newest) {
             stream::hear(&shared.options.runs.join(run), shared, to);
         }
-        std::thread::sleep(LOOK_EVERY);
+        std::thread::sleep(POLL_EVERY);
     }
 }
 

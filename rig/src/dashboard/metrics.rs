@@ -21,7 +21,7 @@ const TYPE: &str = "application/openmetrics-text; version=1.0.0; charset=utf-8";
 const PAUSES: u32 = 20;
 const PAUSE: Duration = Duration::from_millis(30);
 /// How long a viewer waits for a message.
-const LOOK_EVERY: Duration = Duration::from_millis(500);
+const POLL_EVERY: Duration = Duration::from_millis(500);
 /// The states of a run; it is in one of them.
 const STATES: [&str; 5] = ["preparing", "measuring", "paused", "tripped", "ended"];
 
@@ -66,7 +66,7 @@ fn follow(shared: &Arc<Shared>, name: &str) -> Option<Followed> {
     let (taken, key, shared) = (Arc::clone(&view), name.to_string(), Arc::clone(shared));
     let take = move || {
         loop {
-            match viewer.hear(LOOK_EVERY) {
+            match viewer.hear(POLL_EVERY) {
                 Heard::Message(message) => locked(&taken).take(*message),
                 Heard::Nothing => {}
                 Heard::Gone => break,

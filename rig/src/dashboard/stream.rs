@@ -27,7 +27,7 @@ const PATIENCE: Duration = Duration::from_secs(5);
 /// Largest message from a browser in bytes: it has nothing to say here.
 const LARGEST: usize = 256;
 /// How long a viewer waits for a message before it looks whether the client is still there.
-const LOOK_EVERY: Duration = Duration::from_millis(200);
+const POLL_EVERY: Duration = Duration::from_millis(200);
 
 /// Answers a browser's request for a stream.
 pub async fn stream(State(shared): Server, Path(name): Path<String>, upgrade: WebSocketUpgrade) -> Response {
@@ -91,7 +91,7 @@ where
 pub fn hear(folder: &std::path::Path, shared: &Shared, to: &Sender<Message>) {
     let Ok(mut viewer) = Viewer::connect(folder) else { return };
     while !to.is_closed() {
-        let message = match viewer.hear(LOOK_EVERY) {
+        let message = match viewer.hear(POLL_EVERY) {
             Heard::Message(message) => *message,
             Heard::Nothing => continue,
             Heard::Gone => return,

@@ -3,13 +3,13 @@
 use realtime::estimate::Moments;
 use realtime::ports::{Channel, Nanos, NoData, Quality, Sample};
 use realtime::safety::ChannelTiming;
-use runs::report::human::quantity;
+use runs::human::quantity;
 use serde::Serialize;
 
-/// Follows a channel while it is looked at as the loop does.
+/// Follows a channel that is read as by the loop.
 #[derive(Clone, Debug, Default)]
 pub struct Follow {
-    looks: u64,
+    reads: u64,
     invalid: u64,
     missing: Option<NoData>,
     last: Option<Sample>,
@@ -31,7 +31,7 @@ pub struct ChannelReport {
     pub rate_hz: f64,
     /// Samples a second that are due by setup and profile.
     pub due_hz: f64,
-    /// Ages that half, 99 % and all of the looks found, in ms; none where nothing came.
+    /// Ages that half, 99 % and all of the reads found, in ms; none where nothing came.
     pub age_ms: Option<[f64; 3]>,
     /// The age in ms from which a run takes the channel as stale.
     pub age_limit_ms: f64,
@@ -41,20 +41,20 @@ pub struct ChannelReport {
     pub noise_sd: Option<f64>,
     /// Share of samples at the ends of the range.
     pub saturated_share: f64,
-    /// Share of the looks that found an invalid sample or none.
+    /// Share of the reads that found an invalid sample or none.
     pub invalid_share: f64,
     /// Most samples in a row with the same raw value.
     pub equal_in_a_row: u32,
     /// Number of distinct samples.
     pub samples: u64,
-    /// Why the last look found no sample.
+    /// Why the last read found no sample.
     pub missing: Option<NoData>,
 }
 
 impl Follow {
-    /// One look of the loop.
-    pub fn look(&mut self, seen: Channel, now: Nanos) {
-        self.looks += 1;
+    /// One read of the loop.
+    pub fn take(&mut self, seen: Channel, now: Nanos) {
+        self.reads += 1;
         let seen = match seen {
             Ok(seen) => seen,
             Err(why) => {
@@ -66,7 +66,7 @@ impl Follow {
         self.missing = None;
         self.ages_ms.push(now.since(seen.taken_at).seconds() * 1e3);
         let Some(last) = self.last.replace(seen) else { return };
-        // The sample that was there before the first look belongs to no stretch of time.
+        // The sample that was there before the first read belongs to no stretch of time.
         if last.sequence == seen.sequence {
             return;
         }
@@ -101,7 +101,7 @@ impl Follow {
             mean: self.values.mean().or(self.last.map(|last| last.value)).filter(|mean| mean.is_finite()),
             noise_sd: self.values.sd().filter(|sd| sd.is_finite()),
             saturated_share: share(self.saturated, samples),
-            invalid_share: share(self.invalid, self.looks),
+            invalid_share: share(self.invalid, self.reads),
             equal_in_a_row: self.equal_most,
             samples,
             missing: self.missing,
@@ -154,7 +154,7 @@ mod tests {
         let mut follow = Follow::default();
         let now = |ms: u64| Nanos(ms * 1_000_000);
         // The same sample twice, two new ones, one invalid, three equal, one at the end of the range.
-        for (i, look) in [
+        for (i, seen) in [
             seen(1, 5, 0),
             seen(1, 5, 0),
             seen(2, 6, 2),
@@ -167,7 +167,7 @@ mod tests {
         .into_iter()
         .enumerate()
         {
-            follow.look(look, now(i as u64 + 1));
+            follow.take(seen, now(i as u64 + 1));
         }
         let report = follow.report("lateral", "N", &ChannelTiming::SLOW, 0.01);
         assert_eq!((report.samples, report.equal_in_a_row, report.missing), (5, 3, None));

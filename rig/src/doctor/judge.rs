@@ -1,11 +1,11 @@
 //! What was found, against what a run needs.
 
-use super::{Answers, ChannelReport, Found, Look};
+use super::{Answers, ChannelReport, Found, Inspection};
 use drivers::OpenError;
 use realtime::ports::{AmplifierState, Contact, Contacts, NoData, Sample, StageState};
 use realtime::safety::RULES;
+use runs::human::quantity;
 use runs::plan::Plan;
-use runs::report::human::quantity;
 use runs::setup::{Setup, THERMOMETER};
 use serde::Serialize;
 
@@ -41,7 +41,7 @@ impl Finding {
     }
 }
 
-/// What the look is judged for.
+/// What the inspection is judged for.
 pub struct Target<'a> {
     /// The rig.
     pub setup: &'a Setup,
@@ -73,37 +73,37 @@ const LINK: &str = "check cable and power, and what else talks on this line";
 const UNIT: &str = "check unit, factor, type and byte order of the signal in its profile, and `gain`";
 
 /// Judges what was found: one finding an instrument, one of the sweep, one of the plan.
-pub fn judge(look: &Look, target: &Target<'_>) -> Vec<Finding> {
+pub fn judge(inspected: &Inspection, target: &Target<'_>) -> Vec<Finding> {
     let mut instruments: Vec<Finding> =
-        look.found.iter().map(|found| instrument(found, look, target)).collect();
+        inspected.found.iter().map(|found| instrument(found, inspected, target)).collect();
     let mended = instruments.iter().all(|f| f.good);
-    let mut findings: Vec<Finding> = stalled(look).into_iter().collect();
+    let mut findings: Vec<Finding> = stalled(inspected).into_iter().collect();
     if !findings.is_empty() {
-        // Beside stalls the look cannot tell an instrument's fault from the computer's.
+        // Beside stalls an inspection cannot tell an instrument's fault from the computer's.
         for finding in instruments.iter_mut().filter(|f| !f.good) {
             finding.advice = format!("first this computer (above); if it stays so: {}", finding.advice);
         }
     }
     findings.append(&mut instruments);
-    if look.found.iter().all(|f| f.answers.is_ok()) {
-        findings.push(arming(look));
+    if inspected.found.iter().all(|f| f.answers.is_ok()) {
+        findings.push(arming(inspected));
     }
     if let Some(plan) = target.plan {
-        findings.push(planned(look, target.setup, plan, mended));
+        findings.push(planned(inspected, target.setup, plan, mended));
     }
     findings
 }
 
 /// Samples came late or not at all beside stalls of this computer: the fault may be with either.
-fn stalled(look: &Look) -> Option<Finding> {
+fn stalled(inspected: &Inspection) -> Option<Finding> {
     let late = |found: &Found| {
         let mut problems = Vec::new();
         found.channels.iter().for_each(|channel| timely(channel, &mut problems));
         found.answers.iter().for_each(|answers| linked(answers, &mut problems));
         !problems.is_empty()
     };
-    let stalls = &look.stalls;
-    (stalls.count > 0 && look.found.iter().any(late)).then(|| {
+    let stalls = &inspected.stalls;
+    (stalls.count > 0 && inspected.found.iter().any(late)).then(|| {
         let found = format!(
             "did not run its threads {} times for 3 ms and more during the look, {:.0} ms at most: low rates, old samples and \
              missing answers may be its doing",
@@ -115,7 +115,7 @@ fn stalled(look: &Look) -> Option<Finding> {
     })
 }
 
-fn instrument(found: &Found, look: &Look, target: &Target<'_>) -> Finding {
+fn instrument(found: &Found, inspected: &Inspection, target: &Target<'_>) -> Finding {
     let subject = format!("{} `{}` at {}", found.role, found.id, found.address);
     let answers = match &found.answers {
         Ok(answers) => answers,
@@ -133,7 +133,7 @@ fn instrument(found: &Found, look: &Look, target: &Target<'_>) -> Finding {
     let mut problems: Vec<Problem> = Vec::new();
     let mut states = Vec::new();
     // What an amplifier says without its supply is not valid by its own word, and its fault is not its own.
-    let unsupplied = found.role == "amplifier" && look.supply_is_open();
+    let unsupplied = found.role == "amplifier" && inspected.supply_is_open();
     for channel in &found.channels {
         if !(unsupplied && channel.missing == Some(NoData::Invalid)) {
             timely(channel, &mut problems);
@@ -152,17 +152,17 @@ fn instrument(found: &Found, look: &Look, target: &Target<'_>) -> Finding {
     match found.role {
         "amplifier" => {
             let shown = |s| amplifier(s, target.setup, unsupplied, &mut problems);
-            states.push(look.seen.amplifier.map_or_else(no_state, shown));
+            states.push(inspected.seen.amplifier.map_or_else(no_state, shown));
         }
         "stage" => {
             let shown = |s| stage(s, target.setup, &mut problems);
-            states.push(look.seen.stage.map_or_else(no_state, shown));
+            states.push(inspected.seen.stage.map_or_else(no_state, shown));
         }
         "supply_relay" => {
             let shown = |cut: bool| if cut { "open" } else { "closed" };
-            states.push(look.seen.supply.map_or("no state", |supply| shown(supply.cut)).into());
+            states.push(inspected.seen.supply.map_or("no state", |supply| shown(supply.cut)).into());
         }
-        "safety_inputs" => contacts(&look.seen.contacts, &mut states, &mut problems),
+        "safety_inputs" => contacts(&inspected.seen.contacts, &mut states, &mut problems),
         _ => {}
     }
     linked(answers, &mut problems);
@@ -343,12 +343,12 @@ fn contacts(c: &Contacts, states: &mut Vec<String>, problems: &mut Vec<Problem>)
 }
 
 /// Whether the loop's own rules would let a sweep begin.
-fn arming(look: &Look) -> Finding {
-    match look.blocking.filter(|(_, share)| *share > INVALID_SHARE) {
+fn arming(inspected: &Inspection) -> Finding {
+    match inspected.blocking.filter(|(_, share)| *share > INVALID_SHARE) {
         None => {
             let open = "; whether the amplifier has a fault of its own shows when arming closes its supply";
             let found = "the rules of the loop would let it begin";
-            let open = if look.supply_is_open() { open } else { "" };
+            let open = if inspected.supply_is_open() { open } else { "" };
             Finding::new("a sweep", true, format!("{found}{open}"), "")
         }
         Some((cause, share)) => {
@@ -367,10 +367,10 @@ fn is_loaded(rest_n: f64, weight_n: f64, least_n: f64) -> bool {
 }
 
 /// The plan on this rig, with the noise that was found.
-fn planned(look: &Look, setup: &Setup, plan: &Plan, mended: bool) -> Finding {
+fn planned(inspected: &Inspection, setup: &Setup, plan: &Plan, mended: bool) -> Finding {
     let subject = format!("the plan {}", plan.file.name);
     let channel = |name: &str| {
-        let mut all = look.found.iter().flat_map(|f| &f.channels);
+        let mut all = inspected.found.iter().flat_map(|f| &f.channels);
         all.find(|c| c.name == name).filter(|c| c.missing.is_none())
     };
     let noise = channel("lateral").and_then(|c| c.noise_sd);
@@ -411,7 +411,7 @@ mod tests {
     }
 
     /// One channel whose samples came at a share of its rate, beside so many stalls.
-    fn looked(came: f64, mean: f64, stalls: u64) -> Look {
+    fn inspected(came: f64, mean: f64, stalls: u64) -> Inspection {
         let channel = ChannelReport {
             name: "lateral",
             unit: "N",
@@ -444,14 +444,14 @@ mod tests {
             supply: Err(none),
             contacts: Contacts::ABSENT,
         };
-        Look { found: vec![found], seen, blocking: None, stalls }
+        Inspection { found: vec![found], seen, blocking: None, stalls }
     }
 
     #[test]
     fn stalls_of_this_computer_are_reported_where_samples_came_late() {
         let setup = Setup::load("virtual-ideal").unwrap();
-        let of_computer = |look: &Look| {
-            let findings = judge(look, &Target { setup: &setup, plan: None });
+        let of_computer = |inspected: &Inspection| {
+            let findings = judge(inspected, &Target { setup: &setup, plan: None });
             let of = |what: &str| findings.iter().find(|f| f.subject.starts_with(what)).cloned();
             let force = of("force").unwrap();
             let computer = of("this computer");
@@ -459,16 +459,16 @@ mod tests {
             assert_eq!(force.advice.starts_with("first this computer"), first, "{findings:?}");
             (force.good, computer)
         };
-        let (good, finding) = of_computer(&looked(0.48, 0.0, 7));
+        let (good, finding) = of_computer(&inspected(0.48, 0.0, 7));
         let finding = finding.unwrap();
         assert!(!good && !finding.good, "{finding:?}");
         assert!(finding.found.contains("7 times") && finding.found.contains("21 ms"), "{finding:?}");
-        for (look, good, why) in [
-            (looked(0.48, 0.0, 0), false, "nothing is claimed that no monitor saw"),
-            (looked(1.0, 0.0, 7), true, "nothing is explained where nothing is wrong"),
-            (looked(1.0, 1e3, 7), false, "no stall makes a wrong force"),
+        for (inspected, good, why) in [
+            (inspected(0.48, 0.0, 0), false, "nothing is claimed that no monitor saw"),
+            (inspected(1.0, 0.0, 7), true, "nothing is explained where nothing is wrong"),
+            (inspected(1.0, 1e3, 7), false, "no stall makes a wrong force"),
         ] {
-            let (found_good, finding) = of_computer(&look);
+            let (found_good, finding) = of_computer(&inspected);
             assert_eq!((found_good, finding.is_none()), (good, true), "{why}: {finding:?}");
         }
     }

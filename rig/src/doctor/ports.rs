@@ -95,7 +95,7 @@ pub fn open<'a>(
 
 impl Bench {
     /// What the loop would see now.
-    pub fn look(&mut self, now: Nanos) -> Observation {
+    pub fn read(&mut self, now: Nanos) -> Observation {
         Observation {
             forces: self.force.read(now),
             amplifier: self.amplifier.as_mut().map_or(Err(NoData::NotFitted), |port| port.state(now)),

@@ -22,16 +22,16 @@ const QUEUE: usize = 4096;
 const VIEWER_QUEUE: usize = 1024;
 /// Viewers at once.
 const VIEWERS: usize = 16;
-/// A viewer that takes nothing for so long is let go.
+/// A viewer that takes nothing for so long is disconnected.
 const PATIENCE: Duration = Duration::from_secs(5);
 /// How long the end of a run waits for all its viewers together.
 const LAST_WORDS: Duration = Duration::from_secs(2);
-/// Time between two looks for new viewers.
-const LOOK_EVERY: Duration = Duration::from_millis(50);
+/// Time between two polls for new viewers.
+const POLL_EVERY: Duration = Duration::from_millis(50);
 /// Longest line that a viewer may say, in bytes.
 const LONGEST_ASK: u64 = 64;
 
-/// Tells viewers what a run does, from its first news on. Dropped, it tells what is left and closes.
+/// Sends viewers what a run does, from its first update on. Dropped, it sends what is left and closes.
 pub struct Feed {
     run: Run,
     signals: Signals,
@@ -56,9 +56,9 @@ impl Feed {
         Feed { run, signals, before, open: None, now_s: 0.0, lost: 0, refused: false }
     }
 
-    /// Tells news.
-    pub fn news(&mut self, news: &Update<'_>) {
-        let message = match news {
+    /// Passes an update on.
+    pub fn update(&mut self, update: &Update<'_>) {
+        let message = match update {
             Update::Pass(pass) => Message::Pass(Box::new((*pass).clone())),
             Update::Event(event) => Message::Event(TimedEvent::of(self.now_s, (*event).clone())),
             Update::State(snapshot) => {
@@ -156,7 +156,7 @@ struct Seat {
 impl Teller {
     fn tell(mut self, queue: &Receiver<Message>) -> usize {
         loop {
-            match queue.recv_timeout(LOOK_EVERY) {
+            match queue.recv_timeout(POLL_EVERY) {
                 Ok(message) => self.pass_on(message),
                 Err(RecvTimeoutError::Timeout) => {}
                 Err(RecvTimeoutError::Disconnected) => break,

@@ -13,8 +13,8 @@ use std::time::{Duration, Instant};
 /// How long a run may take to show that it stops, first after a request by its feed, then after a signal.
 const BY_FEED: Duration = Duration::from_secs(3);
 const BY_SIGNAL: Duration = Duration::from_secs(15);
-/// Time between two looks.
-const LOOK_EVERY: Duration = Duration::from_millis(50);
+/// Time between two polls.
+const POLL_EVERY: Duration = Duration::from_millis(50);
 
 /// Processes that were sent a SIGINT from here, each for a run: a second one would end them before their drive is read back off.
 static SIGNALLED: Mutex<BTreeSet<(u32, PathBuf)>> = Mutex::new(BTreeSet::new());
@@ -36,7 +36,8 @@ pub fn stop(folder: &Path) -> Result<String, String> {
         return Err("NOT STOPPED: another machine or user leads this run; stop it there".into());
     };
     let again = !SIGNALLED.lock().unwrap_or_else(PoisonError::into_inner).insert((number, folder.into()));
-    if !again && let Err(why) = interrupt(number) {
+    let process = i32::try_from(number).ok().and_then(Pid::from_raw).ok_or(rustix::io::Errno::SRCH);
+    if !again && let Err(why) = process.and_then(|process| kill_process(process, Signal::INT)) {
         return Err(format!("NOT STOPPED: process {number}: {why}"));
     }
     if shows(viewer.as_mut(), folder, BY_SIGNAL) {
@@ -47,11 +48,6 @@ pub fn stop(folder: &Path) -> Result<String, String> {
     ))
 }
 
-fn interrupt(number: u32) -> rustix::io::Result<()> {
-    let process = i32::try_from(number).ok().and_then(Pid::from_raw).ok_or(rustix::io::Errno::SRCH)?;
-    kill_process(process, Signal::INT)
-}
-
 fn by_feed(viewer: &mut Viewer, folder: &Path) -> bool {
     viewer.asking().is_ok_and(|mut ask| ask(Ask::Stop).is_ok()) && shows(Some(viewer), folder, BY_FEED)
 }
@@ -60,7 +56,7 @@ fn by_feed(viewer: &mut Viewer, folder: &Path) -> bool {
 fn shows(mut viewer: Option<&mut Viewer>, folder: &Path, within: Duration) -> bool {
     let until = Instant::now() + within;
     while Instant::now() < until {
-        match viewer.as_mut().map(|viewer| viewer.hear(LOOK_EVERY)) {
+        match viewer.as_mut().map(|viewer| viewer.hear(POLL_EVERY)) {
             Some(Heard::Message(message)) => match *message {
                 Message::Ended(_) => return true,
                 Message::Event(event) if matches!(event.event, Event::StopRequested | Event::Tripped(_)) => {
@@ -71,7 +67,7 @@ fn shows(mut viewer: Option<&mut Viewer>, folder: &Path, within: Duration) -> bo
             Some(Heard::Gone) => viewer = None,
             _ if !run_dir::is_held(folder) => return true,
             Some(Heard::Nothing) => {}
-            None => std::thread::sleep(LOOK_EVERY),
+            None => std::thread::sleep(POLL_EVERY),
         }
     }
     false

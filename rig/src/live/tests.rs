@@ -61,12 +61,12 @@ fn whoever_comes_late_has_the_same_picture() {
     let folder = tempfile::tempdir().unwrap();
     let mut feed = Feed::new(run(folder.path()), vec![pass(1), pass(2)], &Signals::default());
     assert!(Viewer::connect(folder.path()).is_err(), "nothing was sent yet");
-    feed.news(&Update::Event(&Event::Armed));
+    feed.update(&Update::Event(&Event::Armed));
     let (mut early, mut view) = (Viewer::connect(folder.path()).unwrap(), View::default());
     seen(&mut early, &mut view, |view| view.events.len() == 1);
-    feed.news(&Update::Pass(&pass(3)));
-    feed.news(&Update::Progress(1, 7, 5.0));
-    feed.news(&Update::Event(&Event::Paused { point: 4 }));
+    feed.update(&Update::Pass(&pass(3)));
+    feed.update(&Update::Progress(1, 7, 5.0));
+    feed.update(&Update::Event(&Event::Paused { point: 4 }));
     seen(&mut early, &mut view, |view| view.paused);
     let (mut late, mut same) = (Viewer::connect(folder.path()).unwrap(), View::default());
     seen(&mut late, &mut same, |view| view.progress.made == 3);
@@ -83,7 +83,7 @@ fn what_viewers_ask_is_heard_and_nothing_else() {
     let folder = tempfile::tempdir().unwrap();
     let signals = Signals::default();
     let mut feed = Feed::new(run(folder.path()), Vec::new(), &signals);
-    feed.news(&Update::Event(&Event::Armed));
+    feed.update(&Update::Event(&Event::Armed));
     let heard = |what: &dyn Fn() -> bool| {
         let began = Instant::now();
         while !what() {
@@ -112,18 +112,18 @@ fn what_viewers_ask_is_heard_and_nothing_else() {
 fn a_viewer_that_reads_nothing_holds_nobody_up() {
     let folder = tempfile::tempdir().unwrap();
     let mut feed = Feed::new(run(folder.path()), Vec::new(), &Signals::default());
-    feed.news(&Update::Event(&Event::Armed));
+    feed.update(&Update::Event(&Event::Armed));
     let mut deaf = UnixStream::connect_addr(&place(folder.path()).unwrap()).unwrap();
     let (mut viewer, mut view) = (Viewer::connect(folder.path()).unwrap(), View::default());
     seen(&mut viewer, &mut view, |view| view.events.len() == 1);
     for point in 0..4000 {
-        feed.news(&Update::Pass(&pass(point)));
+        feed.update(&Update::Pass(&pass(point)));
         while view.passes.len() + 500 < point as usize {
             seen(&mut viewer, &mut view, |view| view.passes.len() + 500 >= point as usize);
         }
     }
     seen(&mut viewer, &mut view, |view| view.passes.len() == 4000);
-    // It was let go: what the kernel holds for it comes, and then the end.
+    // It was disconnected: what the kernel holds for it comes, and then the end.
     deaf.set_read_timeout(Some(SOON)).unwrap();
     let mut held = Vec::new();
     deaf.read_to_end(&mut held).unwrap();
@@ -135,7 +135,7 @@ fn a_viewer_that_reads_nothing_holds_nobody_up() {
 fn slow_viewers_hold_up_no_end() {
     let folder = tempfile::tempdir().unwrap();
     let mut feed = Feed::new(run(folder.path()), Vec::new(), &Signals::default());
-    feed.news(&Update::Event(&Event::Armed));
+    feed.update(&Update::Event(&Event::Armed));
     for _ in 0..3 {
         let mut slow = UnixStream::connect_addr(&place(folder.path()).unwrap()).unwrap();
         std::thread::spawn(move || {
@@ -148,7 +148,7 @@ fn slow_viewers_hold_up_no_end() {
     let (mut viewer, mut view) = (Viewer::connect(folder.path()).unwrap(), View::default());
     seen(&mut viewer, &mut view, |view| view.events.len() == 1);
     for point in 0..900 {
-        feed.news(&Update::Pass(&pass(point)));
+        feed.update(&Update::Pass(&pass(point)));
         while view.passes.len() + 300 < point as usize {
             seen(&mut viewer, &mut view, |view| view.passes.len() + 300 >= point as usize);
         }
@@ -168,14 +168,14 @@ fn slow_viewers_hold_up_no_end() {
 fn a_drive_that_is_not_off_is_reported_before_the_end() {
     let folder = tempfile::tempdir().unwrap();
     let mut feed = Feed::new(run(folder.path()), Vec::new(), &Signals::default());
-    feed.news(&Update::Off(&runs::supervisor::OffReport::off()));
-    feed.news(&Update::Event(&Event::Armed));
+    feed.update(&Update::Off(&runs::supervisor::OffReport::off()));
+    feed.update(&Update::Event(&Event::Armed));
     let (mut viewer, mut view) = (Viewer::connect(folder.path()).unwrap(), View::default());
     seen(&mut viewer, &mut view, |view| view.events.len() == 1);
     assert_eq!(view.not_off, None);
     let not_off = runs::supervisor::NotOff { instrument: "x".into(), drives: true, why: "silent".into() };
     let off = runs::supervisor::OffReport { read_back: false, not_read_back: vec![not_off] };
-    feed.news(&Update::Off(&off));
+    feed.update(&Update::Off(&off));
     seen(&mut viewer, &mut view, |view| view.not_off.is_some());
     assert_eq!(view.not_off, Some(off.words()));
     let (mut late, mut same) = (Viewer::connect(folder.path()).unwrap(), View::default());

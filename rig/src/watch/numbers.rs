@@ -2,8 +2,8 @@
 
 use crate::live::{State, View};
 use realtime::cycle::Phase;
+use runs::human::number;
 use runs::print::clean;
-use runs::report::human::number;
 
 /// States of the last second.
 const SECOND: usize = 10;

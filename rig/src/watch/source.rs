@@ -90,7 +90,7 @@ impl Folder {
         let made = view.passes.len();
         let planned = planned.unwrap_or(view.progress.planned);
         view.progress = Progress { made, planned, remaining_s: 0.0 };
-        // A run may be taken up again.
+        // A run may be resumed.
         self.ended = ended.is_some();
         view.ended = ended;
         seen.view.states.clear();

@@ -18,7 +18,7 @@ use std::path::Path;
 use std::sync::mpsc::{Receiver, sync_channel};
 
 /// Time of the loop from one look at the air to the next.
-const LOOK_EVERY: Nanos = Nanos(100_000_000);
+const POLL_EVERY: Nanos = Nanos(100_000_000);
 /// Time that a virtual hand waits for a level before it says what the gauge shows.
 const PATIENCE: Nanos = Nanos(30_000_000_000);
 const AIRS: OfAir<Air> = [Air::Pressure, Air::Temperature, Air::Humidity];
@@ -174,7 +174,7 @@ impl Bench {
                 }
             }
         }
-        if self.looked.is_none_or(|at| now.since(at) >= LOOK_EVERY) {
+        if self.looked.is_none_or(|at| now.since(at) >= POLL_EVERY) {
             self.looked = Some(now);
             self.look(now, sequence);
         }

@@ -30,7 +30,7 @@ impl Compared {
     /// # Errors
     /// A folder that holds no run, a run without a pass without vibration.
     pub fn of(folders: [&Path; 2]) -> miette::Result<Self> {
-        let [a, b] = [crate::report::read(folders[0])?, crate::report::read(folders[1])?];
+        let [a, b] = [crate::run_data::read(folders[0])?, crate::run_data::read(folders[1])?];
         let [facts_a, facts_b] = [record_facts(folders[0])?, record_facts(folders[1])?];
         let [noise_a, noise_b] = [noise(folders[0])?, noise(folders[1])?];
         let sides = [Side::of(&a, noise_a), Side::of(&b, noise_b)];

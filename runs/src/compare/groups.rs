@@ -8,7 +8,7 @@
 use super::folders::{noise, reference};
 use super::{Reference, Side, air_of, by_condition, set_by};
 use crate::plan::SKIN_MOISTURE;
-use crate::report::RunData;
+use crate::run_data::RunData;
 use crate::run_dir::began;
 use clap::ValueEnum;
 use miette::WrapErr;
@@ -174,7 +174,7 @@ impl Grouped {
 }
 
 fn read(folder: &Path, by: GroupBy) -> miette::Result<Read> {
-    let data = crate::report::read(folder)?;
+    let data = crate::run_data::read(folder)?;
     let noise = noise(folder)?;
     let side = Side::of(&data, noise);
     let reference = reference(&side, folder)?;

@@ -3,8 +3,8 @@
 
 use super::{Plan, Point};
 use crate::fidelity::dynamics::Dynamics;
+use crate::human::{number, quantity};
 use crate::input::{Problems, place_of};
-use crate::report::human::{number, quantity};
 use models::condition::Condition;
 use models::inverse::{Reach, quick};
 use models::prediction::FrictionModel;

@@ -1,8 +1,8 @@
 //! From a plan to its passes, each checked against the limits before anything moves.
 
 use super::Plan;
+use crate::human::quantity;
 use crate::input::{self, BadInput, Problems, unit_meant};
-use crate::report::human::quantity;
 use models::condition::{Ambient, Condition};
 use models::covariate::Covariate;
 use models::quantity::{Direction, PeakToPeak};

@@ -2,8 +2,8 @@
 //! middle of its sweep.
 
 use super::{PassTimes, Plan};
+use crate::human::quantity;
 use crate::input::{Problems, place_of};
-use crate::report::human::quantity;
 use models::covariate::Covariate;
 
 /// The values of one setting that an instrument takes or sees.

@@ -4,8 +4,8 @@ mod file;
 
 use super::{Plan, Series};
 use crate::fidelity::dynamics::Dynamics;
+use crate::human::quantity;
 use crate::input::Problems;
-use crate::report::human::quantity;
 use models::target::{Feedback, MOST_DELAY, Target};
 use rand::{RngExt, SeedableRng};
 use rand_chacha::ChaCha12Rng;

@@ -3,8 +3,8 @@
 
 use super::points::{Visit, series_place};
 use super::{Plan, Point, Resolution};
+use crate::human::quantity;
 use crate::input::BadInput;
-use crate::report::human::quantity;
 use diagnosis::next::grid::expected_change_n;
 use models::condition::Condition;
 use models::prediction::FrictionModel;

@@ -11,9 +11,9 @@ mod passes;
 mod timing;
 
 use super::html::{bar, cell, columns, escape, glossary, head, list, note, numeric, row, shell, table};
-use super::human::number;
 use super::plots::verdict::{Seen, errors_against};
 use super::plots::{beyond, ends};
+use crate::human::number;
 use crate::verdict::{listed, looks_like, name, plain};
 use diagnosis::Verdict;
 use diagnosis::data::Table;

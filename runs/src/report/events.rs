@@ -1,8 +1,8 @@
 //! What happened during a run, in words: for the terminal and for the page.
 
 use super::html::{columns, escape, table};
-use super::human::number;
 use crate::ambient::AIR;
+use crate::human::number;
 use crate::sequence::Event;
 use realtime::safety::Cause;
 
@@ -79,20 +79,6 @@ pub fn describe(event: &Event) -> String {
             "{certificate} holds within a range of temperatures, and the amplifier reports none: only the setup's \
              temperature_c was checked"
         ),
-        _ => at_rig(event),
-    }
-}
-
-/// What happened at the rig between passes.
-fn at_rig(event: &Event) -> String {
-    let of = |quantity: &str, value: f64| {
-        let known = AIR.iter().find(|(covariate, _)| covariate.name == quantity);
-        known.map_or_else(
-            || format!("{quantity} {}", number(value)),
-            |(c, _)| format!("{} {} {}", c.words, number(value * c.shown.0), c.shown.1),
-        )
-    };
-    match event {
         Event::Disarmed { supply_open: true } => {
             "disarmed: the drive is off and its supply open, both read back; the stage is at rest".into()
         }
@@ -112,22 +98,30 @@ fn at_rig(event: &Event) -> String {
             format!("{step}: {answer} ({answered_by}){refused}")
         }
         Event::Waited { step, waited_s } => format!("{step}: waited {waited_s:.0} s"),
-        Event::LevelSet { quantity, wanted } => format!("set: {}", of(quantity, *wanted)),
+        Event::LevelSet { quantity, wanted } => format!("set: {}", air(quantity, *wanted)),
         Event::LevelReached { quantity, wanted, found, source, after_s } => {
-            let [wanted, found] = [wanted, found].map(|value| of(quantity, *value));
+            let [wanted, found] = [wanted, found].map(|value| air(quantity, *value));
             format!("{wanted} reached after {after_s:.1} s: {found} ({source})")
         }
         Event::LevelNotReached { quantity, wanted, last } => format!(
             "{} was not reached: {}",
-            of(quantity, *wanted),
-            last.map_or_else(|| "nothing was read".into(), |last| format!("last {}", of(quantity, last)))
+            air(quantity, *wanted),
+            last.map_or_else(|| "nothing was read".into(), |last| format!("last {}", air(quantity, last)))
         ),
         Event::LevelLost { point, quantity, wanted, range: [low, high] } => {
-            let [wanted, low, high] = [wanted, low, high].map(|value| of(quantity, *value));
+            let [wanted, low, high] = [wanted, low, high].map(|value| air(quantity, *value));
             format!("point {point}: {wanted} was lost, {low} to {high}; the pass is marked")
         }
-        _ => String::new(),
     }
+}
+
+/// A level of the air in words and in the unit in which people read it.
+fn air(quantity: &str, value: f64) -> String {
+    let known = AIR.iter().find(|(covariate, _)| covariate.name == quantity);
+    known.map_or_else(
+        || format!("{quantity} {}", number(value)),
+        |(c, _)| format!("{} {} {}", c.words, number(value * c.shown.0), c.shown.1),
+    )
 }
 
 /// The events of a run as a table: loop time in s, and what happened.

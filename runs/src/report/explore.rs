@@ -1,10 +1,10 @@
 //! The part of a run's page that is worked with: the script, the library that draws, and the data, all in the
 //! page itself. Without JavaScript it stays hidden, and the figures below say the same.
 
-use super::RunData;
 use super::events::describe;
-use super::human::rounded;
 use super::traces::Trace;
+use crate::human::rounded;
+use crate::run_data::RunData;
 use crate::sequence::MeasuredPass;
 use crate::session::{REPLAYABLE, Replayable};
 use models::quantity::PeakToPeak;

@@ -1,10 +1,10 @@
 //! What a page and a terminal say of a rendered target.
 
 use super::html::{columns, escape, list, note, table};
-use super::human::{number, quantity};
 use super::plots::fidelity::{key, over_position, transfer};
 use crate::fidelity::dynamics::Part;
 use crate::fidelity::{Fidelity, Group, Late};
+use crate::human::{number, quantity};
 use std::fmt::Write;
 
 /// Groups whose profile is drawn.

@@ -1,14 +1,14 @@
 //! The page: words and tables around the figures.
 
-use super::RunData;
 use super::comparison::air_cell;
 use super::html::{cell, columns, escape, glossary, head, list, note, row, shell, table};
-use super::human::number;
 use super::published::Published;
 use super::traces::Trace;
-use super::{about, events, explore, fidelity, plots, published};
+use super::{events, explore, fidelity, plots, published};
 use crate::ambient::{AIR, LevelsFound, levels_of};
+use crate::human::number;
 use crate::input::unit_of;
+use crate::run_data::{RunData, about};
 use crate::sequence::Outcome;
 use models::condition::Ambient;
 use std::fmt::Write;
@@ -84,8 +84,8 @@ fn verdict(w: &mut String, run: &RunData) {
         let last = run.passes.iter().rev().find_map(|p| p.comparison.as_ref());
         escape(&format!("Finding: {}.", realtime::compare::Agreement::of(last, complete)))
     };
-    let psi_star =
-        run.psi_star().map_or_else(String::new, |found| format!("<br>{}.", escape(&found.to_string())));
+    let psi_star = run.summary.as_ref().and_then(|s| s.psi_star);
+    let psi_star = psi_star.map_or_else(String::new, |found| format!("<br>{}.", escape(&found.to_string())));
     let class = if departed.is_some() { "verdict departed" } else { "verdict" };
     let _ = writeln!(w, "<p class=\"{class}\">{finding}<br>{outcome}{psi_star}</p>");
     for remark in about::remarks(&run.passes) {

@@ -1,11 +1,11 @@
 //! Published values beside the passes of a run: the numbers that the paper's text states, or those of a
 //! user's file, each with its source.
 
-use super::RunData;
 use super::html::{cell, columns, escape, note, numeric, row, table};
-use super::human::number;
 use super::plots::published::panels;
+use crate::human::number;
 use crate::input::{MAX_TABLE_BYTES, bytes_of};
+use crate::run_data::RunData;
 use miette::WrapErr;
 use serde::Deserialize;
 use std::path::Path;

@@ -82,6 +82,6 @@ mod tests {
         assert_eq!(holder(folder.path()), None);
         drop(claimed);
         fs::write(&lock, std::process::id().to_string()).unwrap();
-        assert_eq!(holder(folder.path()), None, "it was let go");
+        assert_eq!(holder(folder.path()), None, "it was released");
     }
 }

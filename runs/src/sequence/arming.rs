@@ -71,7 +71,7 @@ impl Arming {
     }
 
     /// The same rig, to be armed once more. After a person was at it its supply is open on purpose
-    /// (`cut_reported`), which is no news.
+    /// (`cut_reported`), and is not reported again.
     pub(super) fn afresh(self, cut_reported: bool) -> Self {
         let Arming { overrun, human_contact, .. } = self;
         Arming { overrun, human_contact, cut_reported, ..Arming::default() }

@@ -1,4 +1,4 @@
-//! What a sweep tells: its passes, events and end, as the record and the report hold them.
+//! What a sweep reports: its passes, events and end, as the record and the report hold them.
 
 use crate::ambient::{AIR, Level, Source, shown};
 use crate::certificates::temperature::TemperatureFlag;
@@ -17,7 +17,7 @@ pub struct MeasuredPass {
     pub pass: Pass,
     /// A reference without vibration.
     pub reference: bool,
-    /// Held against the model; `None` where the condition is outside the model's domain.
+    /// Compared with the model; `None` where the condition is outside the model's domain.
     pub comparison: Option<PassComparison>,
     /// Regime that the model predicts.
     pub regime: Option<Regime>,

@@ -31,7 +31,7 @@ pub fn run(
     job: Job,
     begun: Begun,
     signals: &Signals,
-    news: &mut dyn FnMut(Update<'_>),
+    update: &mut dyn FnMut(Update<'_>),
 ) -> miette::Result<Summary> {
     let Begun { dir, mut sequence, planned, start_s, answers } = begun;
     if job.setup.file.virtual_rig.is_none() {
@@ -54,7 +54,7 @@ pub fn run(
         Ok((Recorder::begin(file, preamble).into_diagnostic()?, disk))
     });
     let (swept, off) = match record {
-        Ok(record) => sweep(rig, record, &mut keeper, (&mut sequence, &mut bench), signals, news),
+        Ok(record) => sweep(rig, record, &mut keeper, (&mut sequence, &mut bench), signals, update),
         // Before the first row nothing has been driven.
         Err(why) => (Err(why), OffReport::off()),
     };
@@ -86,7 +86,7 @@ fn sweep(
     keeper: &mut Keeper,
     (sequence, bench): (&mut Sequence, &mut Bench),
     signals: &Signals,
-    news: &mut dyn FnMut(Update<'_>),
+    update: &mut dyn FnMut(Update<'_>),
 ) -> (miette::Result<Outcome>, OffReport) {
     // A failure to save ends the sweep.
     let unkept = RefCell::new(None);
@@ -104,14 +104,14 @@ fn sweep(
     let mut keep = |row: &Row, sequence: &Sequence, reaction: Reaction| -> miette::Result<()> {
         recorder.row(row).into_diagnostic()?;
         if let Some(snapshot) = snapshots.take(row) {
-            news(Update::State(&snapshot));
+            update(Update::State(&snapshot));
         }
         keeper::record(&mut recorder, row.now, &reaction.events, reaction.pass.as_ref())?;
-        keeper.keep(&reaction.events, reaction.pass.as_ref(), news)?;
+        keeper.keep(&reaction.events, reaction.pass.as_ref(), update)?;
         if reaction.pass.is_some() {
             disk.still_there()?;
             let (done, all) = sequence.progress();
-            news(Update::Progress(done, all, sequence.remaining_s()));
+            update(Update::Progress(done, all, sequence.remaining_s()));
         }
         if row.cycle.is_multiple_of(FLUSH_EVERY) {
             recorder.flush().into_diagnostic()?;

@@ -5,7 +5,7 @@
 use super::{Job, Notes, Summary, Unfinished, Update};
 use crate::ambient::levels_of;
 use crate::files::Placed;
-use crate::report::about::Remarked;
+use crate::run_data::about::Remarked;
 use crate::run_dir::{RunDir, SUMMARY};
 use crate::sequence::{Event, MeasuredPass, Outcome};
 use crate::setup::Guards;
@@ -168,13 +168,13 @@ impl Keeper {
         &mut self,
         events: &[Event],
         pass: Option<&MeasuredPass>,
-        news: &mut dyn FnMut(Update<'_>),
+        update: &mut dyn FnMut(Update<'_>),
     ) -> miette::Result<()> {
-        events.iter().for_each(|event| news(Update::Event(event)));
+        events.iter().for_each(|event| update(Update::Event(event)));
         if let Some(pass) = pass {
             self.dir.keep(pass)?;
             self.passes += 1;
-            news(Update::Pass(pass));
+            update(Update::Pass(pass));
         }
         Ok(())
     }
@@ -232,7 +232,7 @@ impl Keeper {
         let text = serde_json::to_vec_pretty(&Remarked::of(summary)).into_diagnostic()?;
         self.dir.write(SUMMARY, &text).wrap_err("the summary")?;
         crate::fidelity::write(self.dir.path()).wrap_err("the fidelity")?;
-        let html = crate::report::html(self.dir.path()).wrap_err("the report")?;
+        let (html, _) = crate::report::html(self.dir.path(), &[]).wrap_err("the report")?;
         self.dir.write("report.html", html.as_bytes()).wrap_err("the report")
     }
 

@@ -9,7 +9,7 @@ use models::covariate::{self, Covariate};
 use models::prediction::{EmpiricalPsi, FrictionModel, SpringSlider, Validity};
 use models::surrogate::Surrogate;
 use runs::fingertip::FingertipKind;
-use runs::report::human::number;
+use runs::human::number;
 use runs::report::plots::ends;
 use serde::Serialize;
 

@@ -101,7 +101,7 @@ pub(super) fn run_folder(path: &Path) -> miette::Result<Good> {
     }));
     problems.extend(damage);
     if problems.is_empty() {
-        remarks.extend(runs::report::about::remarks(&runs::run_dir::passes_in(path)?));
+        remarks.extend(runs::run_data::about::remarks(&runs::run_dir::passes_in(path)?));
         return Ok(Good { kind: "run", passes: Some(passes), remarks });
     }
     let mut printed = std::collections::BTreeSet::new();

@@ -1,7 +1,7 @@
 //! What goes with the numbers wherever they go: who, on what, with which instruments, certificates and
 //! versions, under which licence.
 
-use runs::report::RunData;
+use runs::run_data::RunData;
 use std::collections::BTreeMap;
 
 /// Facts by name.

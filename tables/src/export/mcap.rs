@@ -13,7 +13,7 @@ use miette::{Context, IntoDiagnostic};
 use realtime::recorder::{EVENTS, Entry, HEADER, PASSES, Reader};
 use realtime::turn::Row;
 use runs::files::{FLAT_MCAP, beside, fresh, replaceable, sync_folder_of};
-use runs::report::RunData;
+use runs::run_data::RunData;
 use runs::run_dir::records_in;
 use runs::sequence::MeasuredPass;
 use std::borrow::Cow;

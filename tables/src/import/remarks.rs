@@ -5,7 +5,7 @@ use diagnosis::data::{DataError, Table};
 use models::condition::Condition;
 use models::covariate::{self, Covariate};
 use models::pass::Pass;
-use runs::report::human::number;
+use runs::human::number;
 use serde::Serialize;
 
 /// A column's range, in SI.

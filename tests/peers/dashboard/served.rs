@@ -106,18 +106,18 @@ impl Paced {
             let planned = job.points().unwrap().len();
             let as_by_a_clock = Run { fast: false, ..Run::of(&job, planned, 0) };
             let mut feed = Feed::new(as_by_a_clock, Vec::new(), &asked);
-            let summary = rig::session::run(job, &asked, &mut |news| {
-                feed.news(&news);
-                if matches!(news, Update::State(_)) {
+            let summary = rig::session::run(job, &asked, &mut |update| {
+                feed.update(&update);
+                if matches!(update, Update::State(_)) {
                     std::thread::sleep(pace);
                 }
                 let waits = || asked.paused.load(Ordering::Relaxed);
-                if matches!(news, Update::Pass(_)) && waits() {
-                    feed.news(&Update::Event(&Event::Paused { point: 0 }));
+                if matches!(update, Update::Pass(_)) && waits() {
+                    feed.update(&Update::Event(&Event::Paused { point: 0 }));
                     while waits() && asked.stops.load(Ordering::Relaxed) == 0 {
                         std::thread::sleep(Duration::from_millis(20));
                     }
-                    feed.news(&Update::Event(&Event::Resumed));
+                    feed.update(&Update::Event(&Event::Resumed));
                 }
             });
             feed.end(Ended::of(&summary));

@@ -100,7 +100,7 @@ fn a_stop_on_request_is_told_as_one() {
     let asked = signals.clone();
     let mut events = Vec::new();
     let summary = job
-        .run_in_virtual_time(&signals, &mut |news| match news {
+        .run_in_virtual_time(&signals, &mut |update| match update {
             Update::Pass(pass) if pass.pass.point >= 9 => asked.stops.store(1, Ordering::Relaxed),
             Update::Event(event @ Event::Tripped(_)) => events.push(runs::report::events::describe(event)),
             _ => {}

@@ -236,7 +236,7 @@ fn each_unit_of_a_cell_of_two_shows_its_own_axis() {
         at("muprime-stage"),
     );
     setup.amplifier.unit = Some(2);
-    let _served = rig::emulators::embed(&mut setup, &plant(&bench, epoch), false).unwrap();
+    let _served = rig::emulators::serve(&mut setup, &plant(&bench, epoch), false).unwrap();
     let mut rig = drivers::open(&setup, epoch).unwrap();
     let (lateral, normal) = eventually("both axes", || {
         let forces = rig.force.read(now(epoch));

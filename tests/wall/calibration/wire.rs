@@ -249,7 +249,7 @@ struct Bench {
     rig: drivers::Rig,
     setup: Setup,
     epoch: Instant,
-    _embedded: rig::emulators::Embedded,
+    _emulators: rig::emulators::Emulators,
 }
 
 impl Bench {
@@ -259,9 +259,9 @@ impl Bench {
         let (world, hands) = WorldPlant::at_hand(World::new(config, 7).unwrap());
         let plant = SharedPlant::new(world, epoch);
         let mut instruments = setup.instruments();
-        let embedded = rig::emulators::embed(&mut instruments, &plant, false).unwrap();
+        let emulators = rig::emulators::serve(&mut instruments, &plant, false).unwrap();
         let rig = wall::bench::opened(&instruments, epoch);
-        Bench { plant, hands, rig, setup, epoch, _embedded: embedded }
+        Bench { plant, hands, rig, setup, epoch, _emulators: emulators }
     }
 
     fn now(&self) -> Nanos {
@@ -357,7 +357,7 @@ fn a_withheld_amplitude_scale_is_found_over_modbus() {
     let frequency_hz = 27_500.0;
     config.plate.resonance_hz = frequency_hz;
     let scale = 1.0 + VIBROMETER_SD * draw.normal();
-    let Bench { hands, rig, setup, epoch, _embedded, .. } = Bench::new("virtual-ideal", &config);
+    let Bench { hands, rig, setup, epoch, _emulators, .. } = Bench::new("virtual-ideal", &config);
     let mut ports = Ports::new(rig.force, rig.amplifier, rig.stage);
     let model: Box<dyn FrictionModel> = Box::new(SpringSlider::new(setup.tip.finger).unwrap());
     let mut state = CycleState::default();

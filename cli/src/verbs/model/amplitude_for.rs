@@ -7,7 +7,7 @@ use clap::Args;
 use models::inverse;
 use models::quantity::PeakToPeak;
 use models::surrogate::Surrogate;
-use runs::report::human::{number, quantity, to_its_uncertainty};
+use runs::human::{number, quantity, to_its_uncertainty};
 
 /// Arguments of `muprime model amplitude-for`. The amplitude flag is the largest that may be used.
 #[derive(Args)]

@@ -5,8 +5,8 @@ use models::condition::Condition;
 use models::quantity::PeakToPeak;
 use models::ridge::{RidgeCase, case};
 use realtime::safety::HARD;
+use runs::human::quantity;
 use runs::input::{unit_meant, unit_of};
-use runs::report::human::quantity;
 
 /// One operating point. Defaults are the paper's nominal case.
 #[derive(Args, Clone, Debug)]

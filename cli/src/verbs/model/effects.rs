@@ -3,7 +3,7 @@
 use crate::verbs::prelude::*;
 use clap::Args;
 use effects::effect::Prior;
-use runs::report::human::number;
+use runs::human::number;
 
 #[derive(Args)]
 pub struct EffectsArgs {

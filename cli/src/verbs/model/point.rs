@@ -13,7 +13,7 @@ use models::psi::{PsiEq16, PsiEq17};
 use models::reading::Reading;
 use models::spring_slider;
 use models::surrogate::Surrogate;
-use runs::report::human::quantity;
+use runs::human::quantity;
 use serde::Serialize;
 
 /// Reads a law's name on the command line.

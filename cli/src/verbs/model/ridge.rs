@@ -10,7 +10,7 @@ use models::reading::Reading;
 use models::ridge::{
     self, FrictionRule, RidgeCase, RidgeError, RidgeProfile, RidgeRun, RunSettings, Strain, case,
 };
-use runs::report::human::{number, quantity};
+use runs::human::{number, quantity};
 use serde::Serialize;
 use start::OtherStart;
 use std::time::Instant;

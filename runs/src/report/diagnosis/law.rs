@@ -2,8 +2,8 @@
 //! as the table has it, and by the library's law alone.
 
 use super::overlay::Overlay;
+use crate::human::{settings, titled};
 use crate::report::html::{escape, note};
-use crate::report::human::{settings, titled};
 use crate::report::plots::verdict::{LawPass, law};
 use crate::report::plots::{Span, ends};
 use crate::verdict::plain;

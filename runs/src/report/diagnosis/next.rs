@@ -1,7 +1,7 @@
 //! What to measure next, in physical words, with the plan beside it.
 
+use crate::human::{number, titled};
 use crate::report::html::{column, escape, numeric, table};
-use crate::report::human::{number, titled};
 use diagnosis::next::{Experiment, words};
 use diagnosis::verdict::Diagnosis;
 use models::condition::Condition;

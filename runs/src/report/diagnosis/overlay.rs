@@ -1,7 +1,7 @@
 //! What was measured, and what the models say of it.
 
+use crate::human::{settings, titled};
 use crate::report::html::note;
-use crate::report::human::{settings, titled};
 use crate::report::plots::verdict::{Seen, overlay, parity};
 use crate::report::plots::{Span, mu_axis};
 use diagnosis::data::Table;
@@ -53,10 +53,7 @@ impl<'a> Overlay<'a> {
 
     /// The section: panels where enough passes share a base, else every pass against its predictions.
     pub fn section(&self) -> miette::Result<String> {
-        let figures = match self.panels()? {
-            Some(panels) => panels,
-            None => self.parity()?,
-        };
+        let figures = self.panels()?.map_or_else(|| self.parity(), Ok)?;
         Ok(format!("<h2>Measured, and what the models say</h2>{figures}"))
     }
 

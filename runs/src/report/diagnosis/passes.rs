@@ -1,8 +1,8 @@
 //! Every pass of a table with its numbers: where the marks of the maps lead.
 
 use super::overlay::Overlay;
+use crate::human::titled;
 use crate::report::html::{column, columns, table};
-use crate::report::human::titled;
 use diagnosis::data::Table;
 use diagnosis::predict::Forecast;
 use models::covariate::{self, Covariate};

@@ -1,7 +1,7 @@
 //! What the edges in the run's record say of time: a sentence, the mean edge, and the numbers.
 
+use crate::human::number;
 use crate::report::html::{columns, escape, note, numeric, row, table};
-use crate::report::human::number;
 use crate::report::plots::verdict::edge;
 use diagnosis::describe::probability;
 use diagnosis::timing::{Comparison, Form, FormNote, title};

@@ -2,7 +2,7 @@
 
 use super::{COLOURS, GREY, PANEL, Span, WIDE, band, figure, line, measured, series_key};
 use crate::fidelity::{Group, Place};
-use crate::report::human::number;
+use crate::human::number;
 
 /// Wanted and measured `mu'` over position, one direction of one group.
 pub fn over_position(places: &[Place], what: &str) -> miette::Result<String> {

@@ -5,11 +5,11 @@ use super::{
     AMPLITUDE, COLOURS, GREY, PANEL, Span, band, beyond, capital, draw, figure, line, mark, mark_name,
     measured, mu_axis, mu_on,
 };
-use crate::report::RunData;
+use crate::human::{number, settings};
 use crate::report::html::escape;
-use crate::report::human::{number, settings};
 use crate::report::levels::{FORCE, FREQUENCY, Levels, SPEED};
 use crate::report::published::Published;
+use crate::run_data::RunData;
 use crate::sequence::MeasuredPass;
 use models::condition::Condition;
 use models::covariate::{self, Covariate};

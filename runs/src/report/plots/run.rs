@@ -5,10 +5,10 @@ use super::{
     mu_axis, mu_on, series_key, wrong,
 };
 use crate::ambient::{air_words, values};
-use crate::report::RunData;
+use crate::human::number;
 use crate::report::html::escape;
-use crate::report::human::number;
 use crate::report::levels::{FORCE, FREQUENCY, Levels, SPEED};
+use crate::run_data::RunData;
 use crate::sequence::MeasuredPass;
 use models::condition::Condition;
 use models::prediction::{FrictionModel, SpringSlider};
@@ -124,7 +124,7 @@ pub fn mu_against_psi(run: &RunData) -> miette::Result<String> {
     let x = (Span::logarithmic(lowest..highest), "\u{3a8} of Eq. 17");
     let svg = figure(WIDE, x, mu_on(axis), &alt, |chart, size| {
         let law = |star: f64| eq_20(lowest, highest, star);
-        if let Some(found) = run.psi_star() {
+        if let Some(found) = run.summary.as_ref().and_then(|s| s.psi_star) {
             band(chart, &law(found.high), &law(found.low), GREY)?;
             line(chart, law(found.psi_star), GREY, None)?;
         }

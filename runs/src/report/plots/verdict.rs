@@ -3,8 +3,8 @@
 use super::{
     COLOURS, GREY, PANEL, Span, band, beyond, draw, edge_of, figure, line, mark, measured, mu_axis, mu_on,
 };
+use crate::human::titled;
 use crate::report::html::escape;
-use crate::report::human::titled;
 use models::covariate::{Covariate, Scale};
 use plotters::prelude::*;
 

@@ -1,6 +1,6 @@
-//! What stands first on a page: when, who, on what, with which rig and which certificates.
+//! What a reader must know of a run: when, who, on what, with which rig and which certificates.
 
-use super::human::quantity;
+use crate::human::quantity;
 use crate::run_dir::began;
 use crate::sequence::MeasuredPass;
 use crate::session::Summary;

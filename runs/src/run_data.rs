@@ -1,0 +1,73 @@
+//! A run, finished or not, as it is read from its folder for pages, comparisons and exports. An error is a
+//! folder that holds no run.
+
+pub mod about;
+
+use crate::fidelity::{self, Fidelity};
+use crate::input::rig_file;
+use crate::run_dir::{differences, missing_records, of_record, open_record, passes_in, records_in};
+use crate::sequence::MeasuredPass;
+use crate::session::Summary;
+use models::finger::Finger;
+use realtime::recorder::{self, Entry};
+use std::collections::BTreeMap;
+use std::path::Path;
+
+/// A run as its folder holds it.
+pub struct RunData {
+    /// What is known of the run, for the top of a page.
+    pub about: Vec<(&'static str, String)>,
+    /// Facts of the record's first words.
+    pub facts: BTreeMap<String, String>,
+    /// Files that the record holds, by name: setup, plan, rig.toml, certificates, model, profiles.
+    pub files: BTreeMap<String, Vec<u8>>,
+    /// The passes with their comparisons.
+    pub passes: Vec<MeasuredPass>,
+    /// Events with loop time in s.
+    pub events: Vec<(f64, serde_json::Value)>,
+    /// How it ended; `None` for a run that was killed or is still going.
+    pub summary: Option<Summary>,
+    /// The finger of rig.toml.
+    pub finger: Finger,
+    /// How faithfully it rendered its target; none of a run that rendered nothing.
+    pub fidelity: Option<Fidelity>,
+    /// What is damaged or missing in the run's folder.
+    pub damage: Vec<String>,
+}
+
+/// Reads a run's folder.
+pub fn read(folder: &Path) -> miette::Result<RunData> {
+    let passes = passes_in(folder)?;
+    let mut facts = BTreeMap::new();
+    let mut files = BTreeMap::new();
+    let mut events = Vec::new();
+    let mut damage = missing_records(folder)?;
+    for path in records_in(folder)? {
+        let mut start = 0u64;
+        // Entry by entry: the rows of hours would not fit into memory.
+        let mut reader = open_record(&path, recorder::EVENTS)?;
+        for entry in &mut reader {
+            match entry {
+                Entry::Facts { name, facts: found } if name == recorder::HEADER => {
+                    start = found.get("start_unix_ns").and_then(|s| s.parse().ok()).unwrap_or(0);
+                    facts = found;
+                }
+                Entry::Message { log_time, text, .. } => {
+                    if let Ok(event) = serde_json::from_slice(&text) {
+                        events.push((log_time.saturating_sub(start) as f64 * 1e-9, event));
+                    }
+                }
+                Entry::File { name, bytes, .. } => drop(files.insert(name, bytes)),
+                Entry::Facts { .. } => {}
+            }
+        }
+        damage.extend(of_record(&path, reader.integrity().clone()));
+    }
+    damage.extend(differences(folder, &passes)?);
+    let summary =
+        std::fs::read(folder.join("summary.json")).ok().and_then(|b| serde_json::from_slice(&b).ok());
+    let rig = rig_file(&folder.join("rig.toml"))?;
+    let about = about::of_run(folder, &facts, Some(&rig));
+    let fidelity = fidelity::read(folder);
+    Ok(RunData { about, facts, files, passes, events, summary, finger: rig.finger, fidelity, damage })
+}
