@@ -21,8 +21,8 @@ pub struct NetworkStream {
     _thread: Service,
 }
 
-/// Those who are sent to.
-enum Ears {
+/// Where it sends.
+enum Sink {
     Tcp(TcpListener, Vec<TcpStream>),
     /// The last client, or the port that the profile states.
     Udp(UdpSocket, Option<SocketAddr>),
@@ -38,19 +38,19 @@ impl NetworkStream {
         let link = &device.profile().description.link;
         let stream = device.profile().description.stream.clone();
         let stream = stream.ok_or_else(|| io::Error::other("the profile has no stream"))?;
-        let (ears, address) = if link.kind == LinkKind::Udp {
+        let (sink, address) = if link.kind == LinkKind::Udp {
             let socket = UdpSocket::bind(address)?;
             socket.set_nonblocking(true)?;
             let address = socket.local_addr()?;
             let to = link.local_port.map(|port| SocketAddr::from(([127, 0, 0, 1], port)));
-            (Ears::Udp(socket, to), address)
+            (Sink::Udp(socket, to), address)
         } else {
             let listener = TcpListener::bind(address)?;
             listener.set_nonblocking(true)?;
             let address = listener.local_addr()?;
-            (Ears::Tcp(listener, Vec::new()), address)
+            (Sink::Tcp(listener, Vec::new()), address)
         };
-        let work = move |stopped: Arc<AtomicBool>| serve(ears, device, &stream, &plant, &stopped);
+        let work = move |stopped: Arc<AtomicBool>| serve(sink, device, &stream, &plant, &stopped);
         Ok(Self { address, _thread: Service::start("stream-emulator", work)? })
     }
 
@@ -60,20 +60,20 @@ impl NetworkStream {
     }
 }
 
-fn serve(mut ears: Ears, mut device: Device, stream: &Stream, plant: &SharedPlant, stopped: &AtomicBool) {
+fn serve(mut sink: Sink, mut device: Device, stream: &Stream, plant: &SharedPlant, stopped: &AtomicBool) {
     let mut due = plant.now().1;
     while !stopped.load(Ordering::Acquire) {
         let sent = frames(&mut device, stream, plant, &mut due);
-        match &mut ears {
-            Ears::Tcp(listener, clients) => {
+        match &mut sink {
+            Sink::Tcp(listener, clients) => {
                 if let (Ok((client, _)), true) = (listener.accept(), clients.len() < MOST_CLIENTS) {
-                    // One that does not read is let go rather than waited for.
+                    // One that does not read is disconnected, not waited for.
                     let ready = client.set_nodelay(true).and_then(|()| client.set_nonblocking(true));
                     clients.extend(ready.is_ok().then_some(client));
                 }
                 clients.retain_mut(|client| sent.iter().all(|frame| client.write_all(frame).is_ok()));
             }
-            Ears::Udp(socket, to) => {
+            Sink::Udp(socket, to) => {
                 let mut datagram = [0; 1500];
                 while let Ok((_, from)) = socket.recv_from(&mut datagram) {
                     if device.profile().description.link.local_port.is_none() {
