@@ -1,6 +1,7 @@
 //! The pages: every command that any page names exists with its flags, every page is in the book, every link leads somewhere.
 //!
-//! `MUPRIME_UPDATE=1 cargo test --release -p muprime-tests --test docs` writes docs/commands.md. The book itself: tests/peers/book.rs.
+//! `MUPRIME_UPDATE=1 cargo test --release -p muprime-tests --test docs` writes docs/commands.md and docs/how-to/errors.md.
+//! The book itself: tests/peers/book.rs.
 
 #[path = "docs/banned.rs"]
 mod banned;

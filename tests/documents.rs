@@ -1,19 +1,19 @@
 //! What is generated from the profiles: the schema for editors and a page for each instrument.
-//! `MUPRIME_WRITE_DOCUMENTS=1 cargo test --release -p muprime-tests --test documents` writes them anew.
+//! `MUPRIME_UPDATE=1 cargo test --release -p muprime-tests --test documents` writes them anew.
 
 use drivers::{bundled, profile};
 use tests::file;
 
 fn check(path: &str, text: &str) {
     let path = file(path);
-    if std::env::var_os("MUPRIME_WRITE_DOCUMENTS").is_some() {
+    if std::env::var_os("MUPRIME_UPDATE").is_some() {
         std::fs::create_dir_all(path.parent().unwrap()).unwrap();
         std::fs::write(&path, text).unwrap();
     }
     let written = std::fs::read_to_string(&path).unwrap_or_default();
     assert!(
         written == text,
-        "{} is not what the profiles say now; see the head of this file",
+        "{} is old: MUPRIME_UPDATE=1 cargo test --release -p muprime-tests --test documents",
         path.display()
     );
 }

@@ -364,7 +364,7 @@ fn the_page_holds_the_table_of_faults() {
     let text = std::fs::read_to_string(&path).unwrap();
     let begin = text.find("| instrument | fault |").unwrap();
     let end = text[begin..].find("\n\n").map_or(text.len(), |at| begin + at + 1);
-    if std::env::var_os("MUPRIME_WRITE_DOCUMENTS").is_some() {
+    if std::env::var_os("MUPRIME_UPDATE").is_some() {
         std::fs::write(&path, format!("{}{page}{}", &text[..begin], &text[end..])).unwrap();
     } else {
         assert!(text[begin..end] == page, "docs/own-instruments.md must hold this table:\n{page}");
