@@ -102,7 +102,9 @@ fn opens(instrument: &InstrumentSetup) -> Result<(), Closed> {
             let remedy = "bring the interface up, as in `ip link set can0 up type can bitrate 1000000`; `--offline` leaves the ports out";
             if there { Ok(()) } else { Err(("there is no such CAN interface".into(), remedy)) }
         }
-        _ => line(Path::new(address.split_once(':').map_or(address, |(_, path)| path))),
+        LinkKind::ModbusTcp | LinkKind::ModbusRtu | LinkKind::Serial | LinkKind::Can | LinkKind::Canopen => {
+            line(Path::new(address.split_once(':').map_or(address, |(_, path)| path)))
+        }
     }
 }
 

@@ -132,25 +132,26 @@ impl Fingertip {
     /// The tip that a setup names, with the setup's overrides.
     ///
     /// # Errors
-    /// A tip that is not there or not usable, in words.
-    pub fn resolve(setup: &FingertipSetup, folder: &Path) -> Result<Self, String> {
+    /// A tip that is not there or not usable: the key of [`FingertipSetup`] that is wrong, and the problem.
+    pub fn resolve(setup: &FingertipSetup, folder: &Path) -> Result<Self, (&'static str, String)> {
         let text = match bundled::text(BUNDLED, &setup.tip) {
             Some(text) => text.to_string(),
             None => input::text_of(&folder.join(&setup.tip)).map_err(|e| {
-                format!("no fingertip '{}' ({e}); bundled: {}", setup.tip, bundled::names(BUNDLED))
+                ("tip", format!("no fingertip '{}' ({e}); bundled: {}", setup.tip, bundled::names(BUNDLED)))
             })?,
         };
         let file = FingertipFile::read(&setup.tip, &text)
-            .map_err(|e| format!("fingertip '{}'{}", setup.tip, e.after_its_name()))?;
+            .map_err(|e| ("tip", format!("fingertip '{}'{}", setup.tip, e.after_its_name())))?;
         let mut finger = file.finger;
         let set = |slot: &mut f64, stated: Option<f64>| *slot = stated.unwrap_or(*slot);
         set(&mut finger.normal_stiffness_n_per_m, setup.normal_stiffness_n_per_m);
         set(&mut finger.lateral_stiffness_n_per_m, setup.lateral_stiffness_n_per_m);
         set(&mut finger.stiffness_relative_sd, setup.stiffness_relative_sd);
-        usable(&finger).map_err(|(_, problem)| format!("fingertip '{}': {problem}", setup.tip))?;
+        let named = |(key, problem)| (key, format!("fingertip '{}': {problem}", setup.tip));
+        usable(&finger).map_err(named)?;
         let mu0 = setup.mu0.unwrap_or(file.mu0);
         if !(mu0.is_finite() && mu0 > 0.0) {
-            return Err(format!("fingertip '{}': mu0 = {mu0}; a number above zero is needed", setup.tip));
+            return Err(named(("mu0", format!("mu0 = {mu0}; a number above zero is needed"))));
         }
         Ok(Fingertip { name: file.name, kind: file.kind, mu0, finger })
     }
@@ -160,11 +161,26 @@ impl Fingertip {
 mod tests {
     use super::*;
 
-    fn resolved(text: &str) -> Result<Fingertip, String> {
+    fn resolved_with(own: &str, text: &str) -> Result<Fingertip, (&'static str, String)> {
         let folder = tempfile::tempdir().unwrap();
         std::fs::write(folder.path().join("tip.toml"), text).unwrap();
-        let setup: FingertipSetup = toml::from_str("tip = \"tip.toml\"").unwrap();
+        let setup: FingertipSetup = toml::from_str(&format!("tip = \"tip.toml\"\n{own}")).unwrap();
         Fingertip::resolve(&setup, folder.path())
+    }
+
+    fn resolved(text: &str) -> Result<Fingertip, String> {
+        resolved_with("", text).map_err(|(_, problem)| problem)
+    }
+
+    /// A setup's own key was blamed for the number of the tip's file that it replaces.
+    #[test]
+    fn a_problem_names_the_key_of_the_setup_that_causes_it() {
+        let (good, bad) = (BUNDLED[0].1.to_string(), BUNDLED[0].1.replace("mu0 = 0.5", "mu0 = -0.5"));
+        let key = |own: &str, text: &str| resolved_with(own, text).unwrap_err().0;
+        assert_eq!(key("mu0 = 0.7", &bad), "tip");
+        for own in ["mu0", "normal_stiffness_n_per_m", "lateral_stiffness_n_per_m", "stiffness_relative_sd"] {
+            assert_eq!(key(&format!("{own} = -1.0"), &good), own);
+        }
     }
 
     /// The file of a tip passed its check, and a setup that named it refused it with an error of TOML.

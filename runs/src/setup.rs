@@ -293,7 +293,7 @@ impl Setup {
             wrong.add(&["virtual", "ridge_table_strokes"], problem.to_string(), None);
         }
         let tip = Fingertip::resolve(&file.finger, folder);
-        let tip = tip.map_err(|problem| wrong.add(&["finger", tip_key(text, &problem)], problem, None)).ok();
+        let tip = tip.map_err(|(key, problem)| wrong.add(&["finger", key], problem, None)).ok();
         let mut unfit = profiles::resolve(&mut file, folder);
         if unfit.is_empty() {
             unfit = profiles::fit(&file);
@@ -444,11 +444,4 @@ impl Setup {
             calibration: self.certificates.calibration.clone(),
         }
     }
-}
-
-/// The key of `[finger]` that a problem of the fingertip is about.
-fn tip_key(text: &str, problem: &str) -> &'static str {
-    let keys = ["normal_stiffness_n_per_m", "lateral_stiffness_n_per_m", "stiffness_relative_sd", "mu0"];
-    let stated = |key: &str| input::place_of(text, &["finger", key]).is_some();
-    keys.into_iter().find(|key| problem.contains(&format!("{key} =")) && stated(key)).unwrap_or("tip")
 }

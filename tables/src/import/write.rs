@@ -89,7 +89,7 @@ pub fn rig(passes: &[Pass], source: &str, tip: Option<&str>) -> miette::Result<(
             let setup: FingertipSetup =
                 toml::from_str(&format!("tip = {}", toml::Value::from(name))).into_diagnostic()?;
             let tip = Fingertip::resolve(&setup, Path::new("."))
-                .map_err(|e| miette::miette!("--tip {name}: {e}"))?;
+                .map_err(|(_, problem)| miette::miette!("--tip {name}: {problem}"))?;
             (tip.finger, format!("of the fingertip '{}'", tip.name))
         }
         None => {
