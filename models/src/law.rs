@@ -35,6 +35,11 @@ impl BuiltIn {
         }
     }
 
+    /// The names in a sentence.
+    pub fn names() -> String {
+        Self::ALL.map(Self::name).join(", ")
+    }
+
     /// The law of that name.
     pub fn by_name(name: &str) -> Option<Self> {
         Self::ALL.into_iter().find(|law| law.name() == name)

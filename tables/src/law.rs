@@ -5,7 +5,7 @@ use crate::import::{as_csv, is_parquet};
 use calibration::certificate::sha256_hex;
 use miette::{Context, IntoDiagnostic};
 use models::finger::Finger;
-use models::law::Named;
+use models::law::{BuiltIn, Named};
 use models::law_table::grid::Tabulated;
 use models::law_table::{OF_LAWS, VARIABLES, Variable};
 use models::pass::{Pass, coulomb_coefficient};
@@ -78,8 +78,8 @@ pub fn of_text(shown: &str, name: String, text: String, finger: &Finger) -> miet
 /// A law's file name and its text; Parquet as CSV.
 fn text_of(path: &Path) -> miette::Result<(String, String)> {
     let bytes = bytes_of(path, MOST_BYTES).map_err(|e| {
-        let names = "spring-slider, psi, surrogate, or the path of a ridge table, a law table, a surrogate.json or a MODEL.toml";
-        miette::miette!(help = format!("--model takes {names}"), "{e}")
+        let files = "the path of a ridge table, a law table, a surrogate.json or a MODEL.toml";
+        miette::miette!(help = format!("--model takes {}, or {files}", BuiltIn::names()), "{e}")
     })?;
     let name = path.file_name().map_or_else(|| "law".into(), |n| n.to_string_lossy());
     let name = if is_parquet(&bytes) { format!("{name}.csv") } else { name.into_owned() };
