@@ -177,7 +177,8 @@ struct Told {
     end: bool,
 }
 
-/// Reads a stream to its end and counts its bytes in `read`; never more than half of what `first` has read, however fast the machine is.
+/// Reads a stream to its end and counts its bytes in `read`. It reads at most half of what `first` has read,
+/// however fast the machine is.
 fn read_all(
     mut stream: TcpStream,
     read: Arc<AtomicUsize>,
@@ -201,7 +202,8 @@ fn read_all(
 }
 
 /// Six that read, a slow one and one that reads nothing: the run goes on, the server stays small, the slow one is told fewer states and no
-/// fewer passes, the deaf one is disconnected, and whoever comes again sees all. Ten times as fast as a clock, so that what waits is much.
+/// fewer passes, the deaf one is disconnected, and whoever comes again sees all. Ten times as fast as a clock,
+/// so that what waits is much.
 #[test]
 fn viewers_that_do_not_read_hold_nobody_up() {
     let seconds: u64 = std::env::var("MUPRIME_DASHBOARD_SOAK_S").map_or(20, |s| s.parse().unwrap());

@@ -7,7 +7,7 @@ use crate::contact::Contact;
 use std::f64::consts::PI;
 use std::sync::LazyLock;
 
-/// Steps of the phase, a power of two. The mean force is then within 5e-3 of the closed form of a sine (tested).
+/// Steps of the phase, a power of two. The mean force is then within 5e-3 of a sine's closed form (tested).
 const STEPS: usize = 256;
 /// The same where a search only looks for places to begin.
 const COARSE_STEPS: usize = 64;
@@ -69,8 +69,8 @@ fn by_steps(c: &Contact) -> [f64; 2] {
 }
 
 /// Depth of the rest position at which the mean of what the heights press is the load. The mean rises with
-/// the depth, straight between heights and never less steep: Newton's steps end exactly. They start at a depth
-/// that presses at least the load.
+/// the depth, straight between heights and never less steep: Newton's steps end exactly. The first depth must
+/// press at least the load.
 fn depth(heights: &[f64], load: f64, start: f64) -> f64 {
     let n = heights.len() as f64;
     let mut depth = start;
