@@ -188,12 +188,12 @@ fn conditions_between(passes: &[Condition], count: usize) -> Vec<Condition> {
     };
     let (amplitudes, speeds, loads) =
         (levels(|p| p.amplitude.metres()), levels(|p| p.speed_m_s), levels(|p| p.normal_force_n));
-    let between = |value: f64, levels: &[f64], u: (f64, f64)| {
-        let k = levels.partition_point(|v| *v < value * 0.99);
-        match (u.0 < 0.5, levels.get(k + 1)) {
-            (true, Some(next)) if value > 0.0 => value * (next / value).powf(u.1),
-            _ => value,
-        }
+    let between = |value: f64, levels: &[f64], u: (f64, f64)| match (
+        u.0 < 0.5,
+        levels.get(levels.partition_point(|low| *low <= value)),
+    ) {
+        (true, Some(next)) if value > 0.0 => value * (next / value).powf(u.1),
+        _ => value,
     };
     let pick = |u: f64| passes[((u * passes.len() as f64) as usize).min(passes.len() - 1)];
     (0..count)

@@ -72,7 +72,9 @@ pub fn plan(experiment: &diagnosis::next::Experiment) -> String {
     let about = toml::Value::String(experiment.text.clone());
     // Every plan has the settings that every table has, but the direction; a series names what the base cannot.
     let based = |c: &&Covariate| covariate::REQUIRED.iter().any(|r| r.name == c.name);
-    let of = |c: &Condition, k: &Covariate| k.of(c).map(|v| (k.name, v));
+    // Six digits: what was measured of a setting is no more than that.
+    let short = |v: f64| format!("{v:.5e}").parse().unwrap_or(v);
+    let of = |c: &Condition, k: &Covariate| k.of(c).map(|v| (k.name, short(v)));
     let listed = |k: &&Covariate| k.name != covariate::DIRECTION.name;
     let mut text = format!(
         "# Written by muprime diagnose.\nname = \"next-experiment\"\nabout = {about}\nrandomise = false\n\n[base]\n"

@@ -20,14 +20,14 @@ pub(super) struct Cut {
     above: Vec<u8>,
 }
 
-/// Smallest and largest value of each level: values within 2 % of its smallest one are one setting that
-/// drifted.
+/// Smallest and largest value of each level. One setting that drifts or scatters has no gap of 2 % between its
+/// values, and they lie within 6 %.
 pub(super) fn levels(mut values: Vec<f64>) -> Vec<[f64; 2]> {
     values.sort_by(f64::total_cmp);
     let mut list: Vec<[f64; 2]> = Vec::new();
     for v in values {
         match list.last_mut() {
-            Some([low, high]) if v <= *low + 0.02 * low.abs() => *high = v,
+            Some([low, high]) if v - *high <= 0.02 * high.abs() && v - *low <= 0.06 * low.abs() => *high = v,
             _ => list.push([v, v]),
         }
     }
@@ -47,12 +47,20 @@ pub(super) fn cuts(passes: &[Condition], places: &[Condition]) -> Vec<Cut> {
         // Time, place and climate have no levels.
         let set = passes.iter().filter(|_| covariate.role == Role::Setting);
         let levels = levels(set.filter_map(|p| covariate.of(p)).collect());
+        // Apart from the levels on both sides, so that a bound in two or three digits is beyond neither.
+        let apart = |cut: f64| {
+            let below = levels.iter().rev().find(|[_, high]| *high <= cut);
+            match (below, levels.iter().find(|[low, _]| *low >= cut)) {
+                (Some([_, a]), Some([b, _])) => cut.clamp(0.9 * a + 0.1 * b, 0.1 * a + 0.9 * b),
+                _ => cut,
+            }
+        };
         let mut at: Vec<f64> = (1..LEVELS)
             .filter_map(|k| {
                 let quantile = sorted[k * (sorted.len() - 1) / LEVELS];
                 let level = levels.iter().find(|[low, high]| (*low..=*high).contains(&quantile));
                 let end = level.map_or(quantile, |[_, high]| *high);
-                Some(0.5 * (end + sorted.get(sorted.partition_point(|v| *v <= end))?))
+                Some(apart(0.5 * (end + sorted.get(sorted.partition_point(|v| *v <= end))?)))
             })
             .collect();
         at.dedup();
@@ -151,4 +159,38 @@ pub(super) fn named_parts<'a>(list: &'a [Part], chance: &[f64]) -> Vec<&'a Part>
         }
     }
     (0..list.len()).filter(|&k| named[k]).map(|k| &list[k]).collect()
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use models::quantity::PeakToPeak;
+
+    /// Loads that scatter by 2 % about a level are one level, and no cut comes near another one's passes.
+    #[test]
+    fn no_cut_goes_through_a_level_that_scatters() {
+        let passes: Vec<Condition> = (0..120)
+            .map(|i| Condition {
+                normal_force_n: [0.1, 0.5][i % 2] * (1.0 + 0.02 * (i as f64 / 60.0 - 1.0)),
+                amplitude: PeakToPeak::from_metres([0.5e-6, 2.5e-6][i / 2 % 2] * (1.0 + 1e-5 * i as f64)),
+                ..Condition::paper()
+            })
+            .collect();
+        let between: Vec<Condition> = (0..600)
+            .map(|i| Condition {
+                normal_force_n: 0.1 * 5f64.powf(i as f64 / 599.0),
+                amplitude: PeakToPeak::from_metres(0.5e-6 * 5f64.powf((i * 7 % 600) as f64 / 599.0)),
+                ..Condition::paper()
+            })
+            .collect();
+        let cuts = cuts(&passes, &[passes.clone(), between].concat());
+        for (name, level) in
+            [("normal_force_n", [0.1021, 0.4899]), ("amplitude_pp_m", [0.5007e-6, 2.4999e-6])]
+        {
+            let of = |c: &&Cut| covariate::COVARIATES[c.covariate].name == name;
+            let at = &cuts.iter().find(of).expect("two levels can be cut").at;
+            let margin = 0.09 * (level[1] - level[0]);
+            assert!(at.iter().all(|v| (level[0] + margin..level[1] - margin).contains(v)), "{name}: {at:?}");
+        }
+    }
 }

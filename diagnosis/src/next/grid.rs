@@ -31,10 +31,7 @@ pub fn conditions(table: &Table) -> Vec<Condition> {
     let mut frequencies = of(&|p| p.frequency_hz);
     frequencies.sort_by(f64::total_cmp);
     frequencies.dedup_by(|a, b| (*a / *b - 1.0).abs() < 1e-3);
-    let mut pressures: Vec<Option<f64>> = passes.iter().map(|p| p.ambient_pressure_pa).collect();
-    pressures.sort_by(|a, b| a.unwrap_or(0.0).total_cmp(&b.unwrap_or(0.0)));
-    pressures.dedup();
-    let pressures = spread(&pressures, PRESSURES);
+    let pressures = spread(&pressures(passes), PRESSURES);
     let positions = places(of(&|p| p.position_m));
     let amplitudes: Vec<PeakToPeak> = amplitudes.into_iter().map(PeakToPeak::from_metres).collect();
     let list = with_each(&[further(table)], &amplitudes, |c| &mut c.amplitude);
@@ -55,6 +52,14 @@ pub fn conditions(table: &Table) -> Vec<Condition> {
         list.retain(shown);
     }
     thinned(&list)
+}
+
+/// Pressures of the passes, at least 2 % apart: what a gauge reads of one pressure scatters.
+fn pressures(passes: &[Condition]) -> Vec<Option<f64>> {
+    let mut list: Vec<Option<f64>> = passes.iter().map(|p| p.ambient_pressure_pa).collect();
+    list.sort_by(|a, b| a.unwrap_or(0.0).total_cmp(&b.unwrap_or(0.0)));
+    list.dedup_by(|a, b| a.is_some() == b.is_some() && a.zip(*b).is_none_or(|(a, b)| a <= 1.02 * b));
+    list
 }
 
 /// Every condition with each of these values of one setting.
@@ -140,4 +145,17 @@ fn further(table: &Table) -> Condition {
     let follow = table.run_count > 1 && table.runs.windows(2).all(|w| w[1] >= w[0]);
     let into = INTO_RUN * pace;
     Condition { run_time_s: Some(into), time_s: if follow { last.time_s + into } else { into }, ..last }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn one_pressure_that_a_gauge_reads_twice_is_one() {
+        let at = |pressure| Condition { ambient_pressure_pa: pressure, ..Condition::paper() };
+        let passes = [50_005.13, 101_320.0, 50_005.97, 101_325.0].map(|p| at(Some(p)));
+        assert_eq!(pressures(&passes), [Some(50_005.13), Some(101_320.0)]);
+        assert_eq!(pressures(&[at(None), at(None)]), [None]);
+    }
 }
