@@ -234,3 +234,53 @@ fn deadlines_that_were_missed_are_counted_with_their_lateness() {
     };
     assert_eq!([2e-4, 5e-4, 1e-3, 2e-3, 5e-3].map(upto), [0, 2, 2, 3, 4]);
 }
+
+/// A pipeline with a baseline in git: friction that is 30 % higher passed as no difference, a trip was not
+/// mentioned, and a baseline without its record was refused.
+#[test]
+fn a_comparison_gates_a_pipeline() {
+    let folder = tempfile::tempdir().unwrap();
+    let defect = |name: &str, what: &str, parameters: &str| {
+        let text = format!("[[defect]]\nname = \"{what}\"\nparameters = {{ {parameters} }}\n");
+        std::fs::write(folder.path().join(name), text).unwrap();
+    };
+    defect("gain.toml", "lateral_gain", "factor = 1.3");
+    defect("stall.toml", "stage_stall", "from_s = 36.0");
+    let call = |arguments: &[&str]| {
+        let output = muprime().args(arguments).current_dir(folder.path()).output().unwrap();
+        (output.status.code(), texts(&output))
+    };
+    let run = |out: &str, seed: &str, more: &[&str]| {
+        let always = ["run", "--fast", "--setup", "virtual-ideal", "--seed", seed, "--out", out];
+        call(&[&always[..], more].concat()).0
+    };
+    assert_eq!(run("base", "1", &[]), Some(0));
+    assert_eq!(run("gain", "2", &["--defects", "gain.toml"]), Some(0));
+    assert_eq!(run("late", "1", &["--defects", "stall.toml"]), Some(1));
+    let compared = |a: &str, b: &str, status: i32| {
+        let (ended, (printed, told)) = call(&["compare", a, b, "--json", "--fail-on-difference"]);
+        assert_eq!(ended, Some(status), "{printed}{told}");
+        serde_json::from_str::<serde_json::Value>(&printed).unwrap()
+    };
+    let judged = &compared("base", "gain", 1)["comparison"]["judged"];
+    assert_eq!((&judged["answer"], &judged["differ_in"]), (&"differ".into(), &serde_json::json!(["mu_0"])));
+    let (status, (printed, _)) = call(&["compare", "base", "gain"]);
+    assert!(status == Some(0) && printed.starts_with("the runs differ in mu_0 by more"), "{printed}");
+    let (status, _) = call(&["compare", "base", "gain", "--by", "run", "--fail-on-difference"]);
+    assert_eq!(status, Some(2), "groups have no answer to fail on");
+    // A run that tripped, as the page of its report says it.
+    let warnings = |document: &serde_json::Value| document["warnings"].to_string();
+    let late = warnings(&compared("base", "late", 0));
+    assert!(late.contains("late: Ended early after ") && late.contains(" of 98 passes: tripped"), "{late}");
+    assert!(call(&["compare", "base", "late"]).1.0.contains("late: Ended early"));
+    // What is kept in git is enough, and the seed that both have is still seen.
+    let kept = folder.path().join("base");
+    std::fs::remove_file(kept.join("run-1.mcap")).unwrap();
+    let bare = compared("base", "late", 0);
+    assert!(warnings(&bare).contains("no record") && warnings(&bare).contains("have seed 1"), "{bare}");
+    assert_eq!(bare["comparison"]["judged"]["answer"], "not_independent");
+    assert_eq!(bare["differences"], serde_json::json!([]));
+    std::fs::remove_file(kept.join("run.toml")).unwrap();
+    let (status, (_, told)) = call(&["compare", "base", "gain"]);
+    assert!(status == Some(2) && told.contains("without a record, run.toml"), "{told}");
+}

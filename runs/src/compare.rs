@@ -23,8 +23,9 @@ pub mod groups;
 
 pub use folders::Compared;
 
-/// Level of the whole answer: shift and scatter are each tested at half of it.
+/// Level of the whole answer: `mu_0`, shift, scatter and greatest difference have a quarter of it each.
 pub const LEVEL: f64 = 0.05;
+const EACH: f64 = LEVEL / 4.0;
 /// Least number of common conditions for a conclusion on agreement.
 pub const ENOUGH_CONDITIONS: usize = 5;
 /// Relative distances within which two passes have the same condition: amplitude, frequency, speed, load.
@@ -124,19 +125,81 @@ impl Comparison {
         pairs
     }
 
-    /// The same for two runs whose noise is one: a difference stands, likeness says nothing.
-    pub fn of_one_noise(mut self) -> Self {
-        if let Some(judged) = self.judged.as_mut().filter(|judged| judged.answer == Answer::NoDifferenceSeen)
-        {
-            judged.answer = Answer::NotIndependent;
+    /// The answer; without a condition in common none can be given.
+    pub fn answer(&self) -> Answer {
+        self.judged.as_ref().map_or(Answer::CannotTell, |judged| judged.answer)
+    }
+
+    /// The answer in words.
+    pub fn answer_words(&self) -> String {
+        let Some(judged) = &self.judged else {
+            return "cannot tell: the runs have no condition in common".into();
+        };
+        let shift = format!("a shift of mu' above {:.3} that all conditions share", judged.visible_shift);
+        let mu0 = format!("a change of mu_0 above {:.1} %", 100.0 * judged.visible_mu0);
+        match judged.answer {
+            Answer::Differ => format!(
+                "the runs differ in {} by more than their uncertainty explains",
+                judged.differ_in.join(" and ").replace("mu_relative", "mu'")
+            ),
+            Answer::NoDifferenceSeen => format!(
+                "no difference seen; with 90 % probability these would have been detected: {shift}, above {:.3} at one \
+                 condition alone, {mu0}",
+                judged.visible_at_one
+            ),
+            Answer::NotIndependent => "cannot tell: the runs are not independent of each other".into(),
+            Answer::CannotTell => format!(
+                "cannot tell: {} conditions in common, and only {shift}, or {mu0}, would have been detected",
+                self.pairs.len()
+            ),
         }
-        self
+    }
+
+    /// The figures behind it in words: shift of `mu'` and scatter about it, or, where the differences vary,
+    /// from where to where, and only then their mean; a condition that differs most; `mu_0`.
+    pub fn figures_words(&self) -> Vec<String> {
+        let [a, b] = self.references.map(|r| format!("{:.3} \u{b1} {:.3}", r.mu0, r.mu0 * r.relative_sd));
+        let references = format!("mu_0: {a} and {b}");
+        let Some(judged) = &self.judged else { return vec![references] };
+        let ([low, high], conditions) = (judged.shift_interval_95, self.pairs.len());
+        let shift = format!("{:+.4}, 95 % interval {low:+.4} to {high:+.4}", judged.shift);
+        let (chi2, degrees) = (judged.scatter_chi2, judged.scatter_degrees);
+        let scatter =
+            format!("chi2 {chi2:.1} at {degrees} degrees of freedom, {}", p_value(judged.scatter_p));
+        let stated =
+            |p: &Paired| format!("{:+.3} +- {:.3} at {}", p.difference, p.difference_sd, p.setting());
+        let by_difference = |a: &&Paired, b: &&Paired| a.difference.total_cmp(&b.difference);
+        let mut all = match (self.pairs.iter().min_by(by_difference), self.pairs.iter().max_by(by_difference))
+        {
+            (Some(least), Some(most)) if judged.varies() => vec![
+                format!(
+                    "the difference of mu' varies over {conditions} conditions, from {} to {} ({scatter})",
+                    stated(least),
+                    stated(most)
+                ),
+                format!("no single shift describes that: their weighted mean is {shift}"),
+            ],
+            _ => vec![
+                format!("{conditions} conditions: mu' shifts by {shift} ({})", p_value(judged.shift_p)),
+                format!("scatter about it: {scatter}"),
+            ],
+        };
+        let furthest = self.furthest_first().into_iter().take(usize::from(judged.furthest_p < EACH));
+        all.extend(furthest.map(|p| {
+            let p_value = p_value(judged.furthest_p);
+            format!("furthest: {} ({p_value} as the greatest of {conditions})", stated(p))
+        }));
+        let change = 100.0 * (self.references[1].mu0 / self.references[0].mu0 - 1.0);
+        all.push(format!("{references}, {change:+.1} % ({})", p_value(judged.mu0_p)));
+        all
     }
 }
 
-/// The statistics of the paired differences.
-#[derive(Clone, Copy, Debug, PartialEq, Serialize)]
+/// The statistics of the paired differences, and of `mu_0`.
+#[derive(Clone, Debug, PartialEq, Serialize)]
 pub struct Judged {
+    /// Two-sided p-value of one `mu_0`.
+    pub mu0_p: f64,
     /// Shift of `mu'` that all conditions have in common, second less first (generalised least squares).
     pub shift: f64,
     /// Its standard uncertainty, references included.
@@ -151,59 +214,24 @@ pub struct Judged {
     pub scatter_degrees: usize,
     /// p-value of scatter no larger than stated.
     pub scatter_p: f64,
-    /// Shift that would have been seen with a probability of 90 %.
+    /// p-value of the greatest difference in standard deviations, corrected for the number of conditions.
+    pub furthest_p: f64,
+    /// Shift common to all conditions that would have been seen with a probability of 90 %.
     pub visible_shift: f64,
+    /// The same of a shift at one condition, whichever it is.
+    pub visible_at_one: f64,
+    /// The same of a relative change of `mu_0`.
+    pub visible_mu0: f64,
+    /// What differs: `mu_0`, `mu_relative`, both or nothing.
+    pub differ_in: Vec<&'static str>,
     /// The answer.
     pub answer: Answer,
 }
 
 impl Judged {
-    /// The answer in words, for so many conditions in common.
-    pub fn answer_words(&self, conditions: usize) -> String {
-        match self.answer {
-            Answer::Differ => "the runs differ by more than their uncertainty explains".into(),
-            Answer::NoDifferenceSeen => format!(
-                "no difference seen; a shift of mu' above {:.3} would have been detected with 90 % probability",
-                self.visible_shift
-            ),
-            Answer::NotIndependent => "cannot tell: the runs are not independent of each other".into(),
-            Answer::CannotTell => format!(
-                "cannot tell: {conditions} conditions in common, and only a shift of mu' above {:.3} would have been \
-                 detected",
-                self.visible_shift
-            ),
-        }
-    }
-
     /// Whether the differences vary from condition to condition by more than their uncertainty: then no shift describes them.
     pub fn varies(&self) -> bool {
-        self.scatter_p < LEVEL / 2.0
-    }
-
-    /// The figures behind it in words, what decides first: the shift and the scatter about it, or, where the
-    /// differences vary, from where to where, and only then their mean.
-    pub fn figures_words(&self, pairs: &[Paired]) -> [String; 2] {
-        let ([low, high], conditions) = (self.shift_interval_95, pairs.len());
-        let shift = format!("{:+.4}, 95 % interval {low:+.4} to {high:+.4}", self.shift);
-        let (chi2, degrees) = (self.scatter_chi2, self.scatter_degrees);
-        let scatter = format!("chi2 {chi2:.1} at {degrees} degrees of freedom, {}", p_value(self.scatter_p));
-        let stated =
-            |p: &Paired| format!("{:+.3} +- {:.3} at {}", p.difference, p.difference_sd, p.setting());
-        let by_difference = |a: &&Paired, b: &&Paired| a.difference.total_cmp(&b.difference);
-        match (pairs.iter().min_by(by_difference), pairs.iter().max_by(by_difference)) {
-            (Some(least), Some(most)) if self.varies() => [
-                format!(
-                    "the difference of mu' varies over {conditions} conditions, from {} to {} ({scatter})",
-                    stated(least),
-                    stated(most)
-                ),
-                format!("no single shift describes that: their weighted mean is {shift}"),
-            ],
-            _ => [
-                format!("{conditions} conditions: mu' shifts by {shift} ({})", p_value(self.shift_p)),
-                format!("scatter about it: {scatter}"),
-            ],
-        }
+        self.scatter_p < EACH
     }
 }
 
@@ -261,12 +289,6 @@ impl Side {
             + (self.noise.pass_relative_sd * mu_relative).powi(2)
     }
 
-    fn vibrating(&self) -> impl Iterator<Item = &Pass> {
-        self.passes.iter().filter(|p| {
-            p.amplitude > PeakToPeak::ZERO && p.normal_force_n > 0.0 && p.lateral_force_n.is_some()
-        })
-    }
-
     fn mean(&self, passes: &[&Pass], reference: Reference) -> Mean {
         let n = passes.len() as f64;
         let mu = |p: &Pass| p.friction_force_n().unwrap_or(f64::NAN) / (reference.mu0 * p.normal_force_n);
@@ -310,9 +332,11 @@ fn same(a: &Pass, b: &Pass, set: &OfAir<bool>) -> bool {
 /// The passes with vibration of some runs by their condition: its first pass, and the passes of each run.
 fn by_condition<'a>(sides: &[&'a Side]) -> Vec<(&'a Pass, Vec<Vec<&'a Pass>>)> {
     let set = set_by(sides);
+    let vibrating =
+        |p: &&Pass| p.amplitude > PeakToPeak::ZERO && p.normal_force_n > 0.0 && p.lateral_force_n.is_some();
     let mut found: Vec<(&Pass, Vec<Vec<&Pass>>)> = Vec::new();
     for (i, side) in sides.iter().enumerate() {
-        for pass in side.vibrating() {
+        for pass in side.passes.iter().filter(vibrating) {
             let at = found.iter().position(|(first, _)| same(first, pass, &set)).unwrap_or_else(|| {
                 found.push((pass, vec![Vec::new(); sides.len()]));
                 found.len() - 1
@@ -350,7 +374,7 @@ pub fn compare(sides: [&Side; 2], references: [Reference; 2]) -> Comparison {
             difference_sd: (means[0].sd.powi(2) + means[1].sd.powi(2) + shared).sqrt(),
         });
     }
-    let judged = judge(&pairs, shared_variance(&references));
+    let judged = judge(&pairs, &references);
     Comparison { references, pairs, unpaired, judged }
 }
 
@@ -363,7 +387,8 @@ fn level(means: &[Mean; 2]) -> f64 {
 }
 
 /// Generalised least squares of a common shift under `diag(v) + shared m m'`, by the formula of Sherman and Morrison.
-fn judge(pairs: &[Paired], shared: f64) -> Option<Judged> {
+fn judge(pairs: &[Paired], references: &[Reference; 2]) -> Option<Judged> {
+    let shared = shared_variance(references);
     let own: Vec<f64> = pairs.iter().map(|p| p.a.sd.powi(2) + p.b.sd.powi(2)).collect();
     if pairs.is_empty() || own.iter().any(|v| !(v.is_finite() && *v > 0.0)) {
         return None;
@@ -386,15 +411,27 @@ fn judge(pairs: &[Paired], shared: f64) -> Option<Judged> {
         n => ChiSquared::new(n as f64).map_or(f64::NAN, |law| law.sf(scatter_chi2)),
     };
     let shift_p = 2.0 * normal.sf((shift / shift_sd).abs());
-    let visible_shift = (normal.inverse_cdf(1.0 - LEVEL / 4.0) + normal.inverse_cdf(0.9)) * shift_sd;
-    let answer = if shift_p.min(scatter_p) < LEVEL / 2.0 {
+    // What is seen at such a level with a probability of 90 %, in standard deviations.
+    let visible = |level: f64| normal.inverse_cdf(1.0 - level / 2.0) + normal.inverse_cdf(0.9);
+    let visible_shift = visible(EACH) * shift_sd;
+    let visible_mu0 = (visible(EACH) * shared.sqrt()).exp_m1();
+    let mu0_p = 2.0 * normal.sf(((references[1].mu0 / references[0].mu0).ln() / shared.sqrt()).abs());
+    // The greatest of so many by Bonferroni's bound, which holds whatever their correlation.
+    let number = pairs.len() as f64;
+    let most = |of: fn(&Paired) -> f64| pairs.iter().map(of).fold(0.0, f64::max);
+    let furthest_p = (2.0 * number * normal.sf(most(|p| p.deviations().abs()))).min(1.0);
+    let visible_at_one = visible(EACH / number) * most(|p| p.difference_sd);
+    let tested = [("mu_0", mu0_p), ("mu_relative", shift_p.min(scatter_p).min(furthest_p))];
+    let differ_in: Vec<&str> = tested.into_iter().filter(|(_, p)| *p < EACH).map(|(name, _)| name).collect();
+    let answer = if !differ_in.is_empty() {
         Answer::Differ
-    } else if pairs.len() >= ENOUGH_CONDITIONS && visible_shift <= VISIBLE_DEPARTURE {
+    } else if pairs.len() >= ENOUGH_CONDITIONS && visible_shift.max(visible_mu0) <= VISIBLE_DEPARTURE {
         Answer::NoDifferenceSeen
     } else {
         Answer::CannotTell
     };
     Some(Judged {
+        mu0_p,
         shift,
         shift_sd,
         shift_interval_95: [shift - z95 * shift_sd, shift + z95 * shift_sd],
@@ -402,7 +439,11 @@ fn judge(pairs: &[Paired], shared: f64) -> Option<Judged> {
         scatter_chi2,
         scatter_degrees,
         scatter_p,
+        furthest_p,
         visible_shift,
+        visible_at_one,
+        visible_mu0,
+        differ_in,
         answer,
     })
 }

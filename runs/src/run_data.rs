@@ -6,7 +6,7 @@ pub mod about;
 use crate::fidelity::{self, Fidelity};
 use crate::input::rig_file;
 use crate::run_dir::{differences, missing_records, of_record, open_record, passes_in, records_in};
-use crate::sequence::MeasuredPass;
+use crate::sequence::{MeasuredPass, Outcome};
 use crate::session::Summary;
 use models::finger::Finger;
 use realtime::recorder::{self, Entry};
@@ -33,6 +33,21 @@ pub struct RunData {
     pub fidelity: Option<Fidelity>,
     /// What is damaged or missing in the run's folder.
     pub damage: Vec<String>,
+}
+
+impl RunData {
+    /// How the run ended, in words.
+    pub fn ending(&self) -> String {
+        let Some(Summary { outcome, planned, .. }) = &self.summary else {
+            return "The run has no ending: it was killed, or is still going".into();
+        };
+        let why = match outcome {
+            Outcome::Complete => return format!("Complete: {} of {planned} passes", self.passes.len()),
+            Outcome::Tripped(trip) => format!("tripped, {trip}"),
+            outcome => outcome.words(),
+        };
+        format!("Ended early after {} of {planned} passes: {why}", self.passes.len())
+    }
 }
 
 /// Reads a run's folder.

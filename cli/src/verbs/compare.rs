@@ -2,9 +2,9 @@
 
 use super::prelude::*;
 use runs::ambient::air_words;
-use runs::compare::Compared;
 use runs::compare::differences::Difference;
 use runs::compare::groups::{GroupBy, Grouped, MOST_COMPARED};
+use runs::compare::{Answer, Compared};
 use runs::human;
 use runs::print::folded;
 use std::fmt::Write;
@@ -29,6 +29,9 @@ pub struct Args {
     /// Where a page with both of them goes (one HTML file)
     #[arg(long)]
     report: Option<PathBuf>,
+    /// End with status 1 if two runs differ
+    #[arg(long, conflicts_with_all = ["more", "by"])]
+    fail_on_difference: bool,
 }
 
 /// Compares; refused: a folder that holds no run, a run without a pass without vibration, a page that cannot
@@ -44,7 +47,9 @@ pub fn run(args: &Args, json: bool) -> miette::Result<ExitCode> {
         runs::files::write_output(page, runs::report::comparison::page(&compared)?)?;
         say!("report: {} (the dashboard compares two runs by itself)", page.display());
     }
-    answered(json, &json!(compared), folded(&terminal(&compared), 2))
+    answered(json, &json!(compared), folded(&terminal(&compared), 2))?;
+    let differ = compared.comparison.answer() == Answer::Differ;
+    exit(if args.fail_on_difference && differ { FAILED } else { DONE })
 }
 
 /// Compares more than two runs, or two groups of them.
@@ -74,15 +79,7 @@ fn terminal(Compared { comparison: result, warnings: warned, differences: differ
     for warning in warned {
         let _ = writeln!(w, "note: {warning}");
     }
-    match &result.judged {
-        None => w.push_str("cannot tell: the runs have no condition in common\n"),
-        Some(judged) => {
-            let [first, second] = judged.figures_words(&result.pairs);
-            let _ = writeln!(w, "{}\n{first}\n{second}", judged.answer_words(result.pairs.len()));
-        }
-    }
-    let [a, b] = result.references.map(|r| format!("{:.3} \u{b1} {:.3}", r.mu0, r.mu0 * r.relative_sd));
-    let _ = writeln!(w, "mu_0: {a} and {b}");
+    let _ = writeln!(w, "{}\n{}", result.answer_words(), result.figures_words().join("\n"));
     let [left, right] = result.unpaired;
     if left + right > 0 {
         let _ = writeln!(w, "passes at conditions that the other run lacks: {left} and {right}");
@@ -107,12 +104,13 @@ fn terminal(Compared { comparison: result, warnings: warned, differences: differ
             air_words(&p.air).map(|level| format!("  {level}")).collect::<String>()
         );
     }
-    let none = if differ.is_empty() { "none in the records" } else { "" };
+    let none = if differ.is_empty() { "none that both runs state" } else { "" };
     let _ = writeln!(w, "settings that differ: {none}");
     let shown = |value: &Option<String>| match value.as_ref().map(|v| (v, v.parse::<f64>())) {
         None => "none".to_string(),
         Some((_, Ok(value))) if value.fract() != 0.0 => human::number(value),
-        Some((text, _)) => shortened(text, SHOWN),
+        Some((text, _)) if text.chars().count() <= SHOWN => text.clone(),
+        Some((text, _)) => text.chars().take(SHOWN).collect::<String>() + "...",
     };
     // Of a model that only one run has, its keys and its hash add nothing to its name.
     let alone = differ.iter().any(|d| d.what == "model.toml: schema");
@@ -121,11 +119,4 @@ fn terminal(Compared { comparison: result, warnings: warned, differences: differ
         let _ = writeln!(w, "  {}: {} and {}", d.what, shown(&d.a), shown(&d.b));
     }
     text
-}
-
-fn shortened(text: &str, most: usize) -> String {
-    match text.char_indices().nth(most) {
-        Some((end, _)) => format!("{}...", &text[..end]),
-        None => text.into(),
-    }
 }

@@ -1,8 +1,10 @@
 //! Two runs' folders compared: statistics, what must be minded, what differed.
 
 use super::differences::{Difference, between, warnings};
-use super::{Comparison, Reference, Side, compare};
-use crate::run_dir::record_facts;
+use super::{Answer, Comparison, Judged, Reference, Side, compare};
+use crate::run_data::RunData;
+use crate::run_dir::{record_facts, records_in};
+use crate::sequence::Outcome;
 use miette::{IntoDiagnostic, WrapErr};
 use models::rig_file::PassNoise;
 use serde::Serialize;
@@ -13,7 +15,7 @@ use std::path::{Path, PathBuf};
 pub struct Compared {
     /// Their folders.
     pub runs: [PathBuf; 2],
-    /// What stands against a plain reading: shared seeds, damage.
+    /// What speaks against a plain reading: shared seeds, an early ending, damage.
     pub warnings: Vec<String>,
     /// The statistics.
     pub comparison: Comparison,
@@ -30,15 +32,18 @@ impl Compared {
     /// # Errors
     /// A folder that holds no run, a run without a pass without vibration.
     pub fn of(folders: [&Path; 2]) -> miette::Result<Self> {
-        let [a, b] = [crate::run_data::read(folders[0])?, crate::run_data::read(folders[1])?];
-        let [facts_a, facts_b] = [record_facts(folders[0])?, record_facts(folders[1])?];
-        let [noise_a, noise_b] = [noise(folders[0])?, noise(folders[1])?];
-        let sides = [Side::of(&a, noise_a), Side::of(&b, noise_b)];
+        let [a, b] = [read_run(folders[0])?, read_run(folders[1])?];
+        // The records were just read: what can fail is that there is none.
+        let facts = |(at, run): (usize, &RunData)| record_facts(folders[at]).unwrap_or(run.facts.clone());
+        let [facts_a, facts_b] = [(0, &a), (1, &b)].map(facts);
+        let sides = [Side::of(&a, noise(folders[0])?), Side::of(&b, noise(folders[1])?)];
         let [first, second] = [0, 1].map(|i| reference(&sides[i], folders[i]));
-        let comparison = compare([&sides[0], &sides[1]], [first?, second?]);
-        let [table_a, table_b] = [table(folders[0])?, table(folders[1])?];
+        let mut comparison = compare([&sides[0], &sides[1]], [first?, second?]);
+        let [table_a, table_b] = folders.map(|folder| std::fs::read(folder.join("points.csv")).ok());
         let mut warnings = warnings(&facts_a, &facts_b, table_a == table_b);
-        let comparison = if warnings.is_empty() { comparison } else { comparison.of_one_noise() };
+        // Of two runs whose noise is one a difference is a difference; likeness shows nothing.
+        let alike = |j: &&mut Judged| !warnings.is_empty() && j.answer == Answer::NoDifferenceSeen;
+        comparison.judged.iter_mut().filter(alike).for_each(|j| j.answer = Answer::NotIndependent);
         for (folder, run) in folders.into_iter().zip([&a, &b]) {
             warnings.extend(run.damage.iter().map(|d| format!("{}: {d}", folder.display())));
         }
@@ -52,6 +57,28 @@ impl Compared {
     }
 }
 
+/// A run; an early ending and a missing record count as damage. Without a record run.toml gives its facts.
+pub(super) fn read_run(folder: &Path) -> miette::Result<RunData> {
+    let mut run = crate::run_data::read(folder)?;
+    if run.summary.as_ref().is_none_or(|s| s.outcome != Outcome::Complete) {
+        run.damage.insert(0, run.ending());
+    }
+    if records_in(folder)?.is_empty() {
+        let stated: toml::Table = crate::input::text_of(&folder.join("run.toml"))
+            .and_then(|text| toml::from_str(&text).into_diagnostic())
+            .wrap_err("without a record, run.toml must have seed, setup and plan of the run; keep it beside points.csv")?;
+        let words = |value: toml::Value| value.as_str().map_or_else(|| value.to_string(), String::from);
+        let of_record = |name: String| if name == "model" { "model_identity".into() } else { name };
+        run.facts = stated.into_iter().map(|(name, value)| (of_record(name), words(value))).collect();
+        if let Some(summary) = &run.summary {
+            let clock = if summary.loop_report.is_none() { "virtual" } else { "monotonic" };
+            run.facts.insert("clock".into(), clock.into());
+        }
+        run.damage.push("no record: seed, setup and plan are those of run.toml".into());
+    }
+    Ok(run)
+}
+
 /// `mu_0` of a run; the error names its folder.
 pub(super) fn reference(side: &Side, folder: &Path) -> miette::Result<Reference> {
     side.reference().map_err(|why| miette::miette!("{}: {why}", folder.display()))
@@ -59,9 +86,4 @@ pub(super) fn reference(side: &Side, folder: &Path) -> miette::Result<Reference>
 
 pub(super) fn noise(folder: &Path) -> miette::Result<PassNoise> {
     Ok(crate::input::rig_file(&folder.join("rig.toml"))?.noise)
-}
-
-fn table(folder: &Path) -> miette::Result<Vec<u8>> {
-    let path = folder.join("points.csv");
-    std::fs::read(&path).into_diagnostic().wrap_err_with(|| path.display().to_string())
 }

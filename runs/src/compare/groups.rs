@@ -5,7 +5,7 @@
 //! the stated noise makes of it where that is more. A group of one run has the stated noise alone, and its
 //! interval does not hold how far another run would lie.
 
-use super::folders::{noise, reference};
+use super::folders::{noise, read_run, reference};
 use super::{Reference, Side, air_of, by_condition, set_by};
 use crate::plan::SKIN_MOISTURE;
 use crate::run_data::RunData;
@@ -166,7 +166,7 @@ impl Grouped {
             return "cannot tell: no group has a condition in common with the first".into();
         }
         format!(
-            "{apart} of {all} differences from '{}' have a 95 % interval without zero; chance alone would give about {:.0}",
+            "{apart} of {all} differences of mu' from '{}' have a 95 % interval without zero; chance alone would give about {:.0}",
             self.groups[0].name,
             0.05 * all as f64
         )
@@ -174,7 +174,7 @@ impl Grouped {
 }
 
 fn read(folder: &Path, by: GroupBy) -> miette::Result<Read> {
-    let data = crate::run_data::read(folder)?;
+    let data = read_run(folder)?;
     let noise = noise(folder)?;
     let side = Side::of(&data, noise);
     let reference = reference(&side, folder)?;
@@ -237,11 +237,7 @@ fn conditions(runs: &[Read], groups: &[String]) -> Vec<AtCondition> {
     };
     let setting =
         |p: &Pass| [p.normal_force_n, p.frequency_hz, p.amplitude.metres(), p.direction.sign() * p.speed_m_s];
-    let order = |a: &Pass, b: &Pass| {
-        let each = setting(a).into_iter().zip(setting(b));
-        each.map(|(a, b)| a.total_cmp(&b)).find(|o| o.is_ne()).unwrap_or(std::cmp::Ordering::Equal)
-    };
-    found.sort_by(|a, b| order(a.0, b.0));
+    found.sort_by(|a, b| setting(a.0).partial_cmp(&setting(b.0)).unwrap_or(std::cmp::Ordering::Equal));
     found.iter().map(at).collect()
 }
 

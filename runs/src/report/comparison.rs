@@ -20,24 +20,17 @@ pub fn page(compared: &Compared) -> miette::Result<String> {
     let w = &mut html;
     w.push_str(&about(compared, &a, &b));
     let conditions = result.pairs.len();
-    match &result.judged {
-        None => w.push_str(
-            "<div class=\"verdict undecided\"><p>Cannot tell: the runs have no condition in common.</p></div>",
-        ),
-        Some(judged) => {
-            let answer = escape(&judged.answer_words(conditions));
-            let [first, second] = judged.figures_words(&result.pairs).map(|words| escape(&words));
-            let class = match judged.answer {
-                Answer::Differ => " departed",
-                Answer::NoDifferenceSeen => "",
-                Answer::CannotTell | Answer::NotIndependent => " undecided",
-            };
-            let _ = write!(
-                w,
-                "<div class=\"verdict{class}\"><p><strong>{answer}</strong></p><p>{first}<br>{second}</p></div>"
-            );
-        }
-    }
+    let class = match result.answer() {
+        Answer::Differ => " departed",
+        Answer::NoDifferenceSeen => "",
+        Answer::CannotTell | Answer::NotIndependent => " undecided",
+    };
+    let _ = write!(
+        w,
+        "<div class=\"verdict{class}\"><p><strong>{}</strong></p><p>{}</p></div>",
+        escape(&result.answer_words()),
+        escape(&result.figures_words().join("\n")).replace('\n', "<br>")
+    );
     if !compared.warnings.is_empty() {
         let _ = write!(w, "<h2>Caution</h2>{}", list(&compared.warnings, ""));
     }

@@ -59,20 +59,9 @@ pub(super) fn page(run: &RunData, traces: &[Trace], overlay: &[Published]) -> mi
 fn verdict(w: &mut String, run: &RunData) {
     let departed = run.passes.iter().find(|p| p.comparison.is_some_and(|c| c.departed));
     let made = run.passes.len();
-    let planned = run.summary.as_ref().map_or(0, |s| s.planned);
-    let outcome = match run.summary.as_ref().map(|s| &s.outcome) {
-        None => "The run has no ending: it was killed, or is still going.".to_string(),
-        Some(Outcome::Complete) => format!("Complete: {made} of {planned} passes."),
-        Some(Outcome::Tripped(trip)) => {
-            let [trip, remedy] = [&*trip.to_string(), trip.cause.remedy()].map(escape);
-            format!("Ended early after {made} of {planned} passes: tripped, {trip}.<br>{remedy}")
-        }
-        Some(outcome) => {
-            let remedy = outcome.remedy().map_or(String::new(), |remedy| format!("<br>{}", escape(remedy)));
-            let words = escape(&outcome.words());
-            format!("Ended early after {made} of {planned} passes: {words}.{remedy}")
-        }
-    };
+    let remedy = run.summary.as_ref().and_then(|s| s.outcome.remedy());
+    let remedy = remedy.map_or(String::new(), |remedy| format!("<br>{}", escape(remedy)));
+    let outcome = escape(&run.ending()) + "." + &remedy;
     let finding = if let Some(first) = departed {
         format!(
             "<strong>The measurement disagrees with the model</strong> (first at pass {}). \

@@ -66,7 +66,7 @@ pub fn differences(result: &Comparison) -> miette::Result<String> {
     let (x, y) = ((x, AMPLITUDE), (y, "difference of \u{3bc}', second less first"));
     let level_of = |p: &Paired| levels.index(of(p)).min(SERIES - 1);
     let along = |value: f64| vec![(0.0, value), (widest, value)];
-    let shift = result.judged.filter(|judged| !judged.varies());
+    let shift = result.judged.as_ref().filter(|judged| !judged.varies());
     let svg = figure(WIDE, x, y, &alt, |chart, size| {
         if let Some(judged) = &shift {
             let [from, to] = judged.shift_interval_95.map(|v| v.clamp(low, high));
