@@ -179,7 +179,9 @@ impl Safety {
 
     fn trip(&mut self, breach: Breach, step: &Step, decision: &mut Decision) {
         let Breach { cause, value, bound, unit } = breach;
-        let trip = Trip { cause, value, bound, unit, cycle: step.cycle, at: step.now };
+        // A sum with 0.0 is never -0.0, which a reader would see as a number below zero.
+        let trip =
+            Trip { cause, value: value + 0.0, bound: bound + 0.0, unit, cycle: step.cycle, at: step.now };
         self.state = State::Faulted(trip);
         self.requested = false;
         self.watch.forget_the_hand();

@@ -79,6 +79,15 @@ fn value_and_limit_of_a_trip_have_one_unit() {
     }
 }
 
+/// A stage at rest that is to move backwards: its speed along that is -0.0, and a record shows 0.
+#[test]
+fn no_number_of_a_trip_is_minus_zero() {
+    let backwards = Request { velocity_m_s: -0.02, normal_force_n: 0.25, ..Request::default() };
+    let trip = tripped(backwards, |seen| stage(seen).velocity_m_s = 0.0);
+    assert_eq!((trip.cause, trip.value), (Cause::StageNotFollowing, 0.0));
+    assert!(trip.value.is_sign_positive(), "{:?}", trip.value);
+}
+
 #[test]
 fn a_trip_of_an_older_record_is_read() {
     let old = r#"{"cause":"over_travel","value":0.1,"bound":0.05,"cycle":7,"at":7000000}"#;
