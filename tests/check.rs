@@ -565,6 +565,20 @@ fn what_an_instrument_cannot_do_is_refused_beforehand() {
     }
 }
 
+/// Five passes of a run that ended early: the remedy is more passes, not another table.
+#[test]
+fn too_few_passes_are_told_what_gives_more() {
+    let made = Made::new();
+    let table: Vec<String> = made.text("run/points.csv").lines().take(6).map(String::from).collect();
+    std::fs::write(made.at("run/points.csv"), table.join("\n") + "\n").unwrap();
+    for verb in ["diagnose", "check"] {
+        let output = muprime().args(["--json", verb]).arg(made.at("run/points.csv")).output().unwrap();
+        let said = documents(&output)[0].to_string();
+        assert!(said.contains("at least 12") && said.contains("replicates"), "{verb}: {said}");
+        assert!(!said.contains("import"), "{verb}: {said}");
+    }
+}
+
 /// Every number of a plan and of a setup, at values that people write by mistake and at good ones: nothing
 /// that `check` approves is refused by `run`.
 #[test]

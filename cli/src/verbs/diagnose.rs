@@ -14,7 +14,7 @@ use runs::verdict::files;
 use std::sync::{Arc, Mutex, PoisonError};
 use tables::check::refusal;
 use tables::passes::parse_passes;
-use tables::verdict::{self, Subject};
+use tables::verdict::{self, Subject, unfit};
 
 /// Parts of the operating space that are printed, the largest first.
 const PRINTED: usize = 6;
@@ -149,7 +149,7 @@ fn read(inputs: &Inputs<'_>, model: Option<&Path>) -> miette::Result<(Subject, V
                     corrected model to the rendering";
         match rendered {
             true => miette::miette!(help = help, "{why}").wrap_err(shown()),
-            false => refused(miette::Report::msg(why), table),
+            false => refused(unfit(why), table),
         }
     })?;
     let Some(what) = model else { return Ok((whole, damage)) };

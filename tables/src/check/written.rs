@@ -4,6 +4,7 @@ use super::place::{problems_of, remedy};
 use super::{Good, On, judge, kind_of, read_json, shape};
 use crate::import::{as_csv, remarks};
 use crate::schemas::schema::Kind;
+use crate::verdict::unfit;
 use miette::{IntoDiagnostic, WrapErr};
 use runs::input::{MAX_TABLE_BYTES, Problems, bytes_of};
 use std::path::Path;
@@ -30,7 +31,7 @@ pub(super) fn table(path: &Path) -> miette::Result<Good> {
     if passes.iter().all(|p| p.lateral_force_n.is_none()) {
         return Ok(good("table of conditions", Some(passes.len())));
     }
-    diagnosis::data::Table::measured(&passes).into_diagnostic()?;
+    diagnosis::data::Table::measured(&passes).map_err(unfit)?;
     Ok(Good { remarks: remarks::of_table(&passes), ..good("table", Some(passes.len())) })
 }
 
