@@ -35,7 +35,8 @@ pub(crate) fn spawn(instrument: &InstrumentSetup, session: Session) -> Result<Jo
         let port = can::open(&address, link.bitrate.unwrap_or(1_000_000))?;
         let health = session.endpoint.health();
         health.count(&health.connections);
-        let map = Map::of(session, node)?;
+        let map =
+            Map::of(session, node).ok_or_else(|| Ended::Io("the profile is no CiA 402 drive's".into()))?;
         let block = vec![0; map.length];
         let limit_ms = link.response_timeout_ms;
         let mut master = Master { port, node, limit_ms, map, block, tries: 0 };
@@ -58,22 +59,15 @@ struct Map {
 }
 
 impl Map {
-    fn of(session: &Session, node: u8) -> Result<Self, Ended> {
+    /// `None` for a profile that would have been refused: one frame each way, with a status word.
+    fn of(session: &Session, node: u8) -> Option<Self> {
         let profile = session.endpoint.profile();
-        let broken = |what: &str| Ended::Io(format!("the profile has no {what}"));
-        let mut frames = profile.frames().iter().enumerate();
-        let found = frames.find_map(|(i, frame)| match &frame.kind {
-            FrameKind::Messages(_, parts) => Some((FrameId(i), parts.first()?.id + u32::from(node))),
-            _ => None,
-        });
-        let (data, cob) = found.ok_or_else(|| broken("process data to read"))?;
-        let status = profile.signal("statusword").ok_or_else(|| broken("signal `statusword`"))?;
-        let [block] = profile.description.write.as_slice() else {
-            return Err(Ended::Io("set-points go in one frame of process data, no more and no fewer".into()));
-        };
-        let out = block.cob.ok_or_else(|| broken("`cob` of its block"))? + u32::from(node);
-        let length = 2 * usize::from(block.count);
-        Ok(Self { data, cob, status, out, length, rate_hz: block.rate_hz.unwrap_or(100.0) })
+        let (data, status, block) =
+            (FrameId(0), profile.signal("statusword")?, profile.description.write.first()?);
+        let FrameKind::Messages(_, parts) = &profile.frames().first()?.kind else { return None };
+        let [cob, out] = [parts.first()?.id, block.cob?].map(|cob| cob + u32::from(node));
+        let (length, rate_hz) = (2 * usize::from(block.count), block.rate_hz.unwrap_or(100.0));
+        Some(Self { data, cob, status, out, length, rate_hz })
     }
 }
 

@@ -7,6 +7,7 @@ mod compile;
 mod computed;
 mod fits;
 mod frame;
+mod keys;
 mod quantities;
 mod sets;
 

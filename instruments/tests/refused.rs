@@ -312,7 +312,7 @@ fn what_datagrams_multiplexors_and_scattered_registers_cannot_be_is_refused() {
         (
             "reads that look alike over RTU",
             changed(
-                SCATTERED,
+                &SCATTERED.replace("port = 502\n", ""),
                 "kind = \"modbus_tcp\"",
                 "kind = \"modbus_rtu\"\nbaud = 19200\nformat = \"8N1\"",
             ),
@@ -327,5 +327,199 @@ fn what_datagrams_multiplexors_and_scattered_registers_cannot_be_is_refused() {
         };
         assert!(said.contains(cause), "{what}: {said}");
         assert!(said.starts_with("line "), "{what} has no place: {said}");
+    }
+}
+
+const CHAMBER: &str = include_str!("../../drivers/profiles/muprime-chamber.toml");
+const DECODERS: &str = include_str!("../../drivers/profiles/polytec-ofv5000.toml");
+const BOARD: &str = include_str!("../../docs/profiles/bench-board.toml");
+const EDS: &str = include_str!("../../drivers/profiles/cia402-profile-velocity.eds");
+
+/// A status bit of a sensor on CAN was on the wire and never seen: `bits` beside `dbc` was not read.
+#[test]
+fn bits_of_a_dbc_signal_are_read() {
+    let text = include_str!("../../docs/profiles/can-force.toml");
+    let dbc = include_str!("../../docs/profiles/can-force.dbc");
+    let of = |bits: &str, dbc: &str| {
+        let signal =
+            format!("name = \"part\"\ndbc = \"Force.Status\"\n{bits}\n\n[[signal]]\nname = \"status\"");
+        Profile::parse_with(&changed(text, "name = \"status\"", &signal), &|_| Some(dbc.to_string()))
+    };
+    for (bits, status, value) in [
+        ("bits = [1, 1]", 0x02, 1.0),
+        ("bits = [1, 1]", 0xFD, 0.0),
+        ("bits = [4, 4]", 0xA5, 10.0),
+        ("bits = [0, 8]", 0xA5, 165.0),
+    ] {
+        let profile = of(bits, dbc).unwrap_or_else(|error| panic!("{error}"));
+        let mut values = profile.values();
+        let mut frame = [0x07, 0xD0, 0xFE, 0x0C, status, 0x2A];
+        profile.decode(profile.frame("force").unwrap(), &frame, &mut values).unwrap();
+        assert_eq!(values.get(profile.signal("part").unwrap()), value, "{bits} of {status:#x}");
+        // What is encoded over other bytes leaves the other bits alone.
+        frame[4] = !status;
+        let part = profile.signal("part").unwrap();
+        let mut set = |signal| (signal == part).then_some(value);
+        profile.encode(profile.frame("force").unwrap(), &mut frame, &mut set);
+        profile.decode(profile.frame("force").unwrap(), &frame, &mut values).unwrap();
+        assert_eq!(values.get(part), value, "{bits} encoded");
+    }
+    let scaled = dbc.lines().find(|line| line.contains("SG_ Status ")).unwrap();
+    let scaled = changed(dbc, scaled, &scaled.replacen("(1,0)", "(2,0)", 1));
+    for (what, bits, dbc) in [
+        ("beyond its end", "bits = [7, 2]", dbc),
+        ("none", "bits = [0, 0]", dbc),
+        ("of a scaled number", "bits = [1, 1]", &scaled),
+    ] {
+        let said = of(bits, dbc).expect_err(what).to_string();
+        assert!(said.starts_with("line ") && said.contains("`bits` of signal `part`"), "{what}: {said}");
+    }
+}
+
+#[test]
+fn bits_of_an_object_are_read() {
+    let fault = "name = \"fault\"\nobject = [0x6041, 0]\nbits = [3, 1]\n\n[[signal]]\nname = \"velocity\"";
+    let text = changed(DRIVE, "name = \"velocity\"", fault);
+    let profile = Profile::parse_with(&text, &|_| Some(EDS.to_string())).unwrap_or_else(|e| panic!("{e}"));
+    let mut values = profile.values();
+    for (status, value) in [(0x37, 0.0), (0x08, 1.0)] {
+        let frame = profile.frame("actual").unwrap();
+        profile.decode(frame, &[status, 2, 0, 0, 0, 0, 0, 0], &mut values).unwrap();
+        assert_eq!(values.get(profile.signal("fault").unwrap()), value);
+    }
+}
+
+/// A key that nothing reads is refused at its place: behind a line of a good profile each of these is one.
+#[test]
+fn a_key_that_nothing_reads_is_refused() {
+    let init = "[[init]]\ntext = \"\"\n";
+    let wrong = [
+        (RTU, "[link]", "port = 502"),
+        (RTU, "[link]", "connect_timeout_ms = 100"),
+        (RTU, "[link]", "min_gap_ms = 2"),
+        (RTU, "[link]", "rx_terminator = \"\\n\""),
+        (AMPLIFIER, "[link]", "bitrate = 500000"),
+        (AMPLIFIER, "[link]", "tx_terminator = \"\\r\""),
+        (AMPLIFIER, "[link]", "node = 3"),
+        (CAN, "[link]", "unit = 1"),
+        (CAN, "[link]", "baud = 9600"),
+        (CAN, "[link]", "heartbeat_ms = 100"),
+        (DRIVE, "[link]", "base = 1"),
+        (DATAGRAMS, "[link]", "connect_timeout_ms = 100"),
+        (BOARD, "[link]", "rx_terminator = \"\\n\""),
+        (BOARD, "[link]", "unsolicited = [\"ALARM\"]"),
+        (BOARD, "[link]", "error_query = { send = \"ERR?\", ok = [\"0\"] }"),
+        (LINES, "[link]", "choice = { ask = \"NAME {which}\", most = 2 }"),
+        (DECODERS, "[link]", "min_gap_ms = 5"),
+        (DECODERS, "[link]", "backoff_first_ms = 5"),
+        (CHAMBER, "[[poll]]", "sequence = \"magic\""),
+        (CHAMBER, "[[write]]", "rate_hz = 5"),
+        (CHAMBER, "[[set]]", "safe = 101325.0"),
+        (BOARD, "[stream]", "settle_ms = 5"),
+        (BOARD, "[stream]", "start_register = [1, 1]"),
+        (STREAM, "start_register = [410, 0x0200]", "start_function = [70, 1]"),
+        (DATAGRAMS, "[stream]", "believed_after = 2"),
+        (CAN, "[[message]]", "length = 8"),
+        (CAN, "[[message]]", "cob = 5"),
+        (DRIVE, "[[message]]", "request = [1]"),
+        (DRIVE, "[[message]]", "multiplex = 1"),
+        (SCPI, "[[query]]", "unit = \"V\"\nlength = 3"),
+        (DRIVE, "[[write]]", "address = 5"),
+        (AMPLIFIER, "[[write]]", "cob = 5"),
+        (CAN, "[[signal]]", "byte_order = \"DCBA\""),
+        (CAN, "[[signal]]", "type = \"f32\""),
+        (CAN, "[[signal]]", "register = 7"),
+        (CAN, "[[signal]]", "array = 2"),
+        (DRIVE, "[[signal]]", "type = \"f32\""),
+        (DRIVE, "[[signal]]", "byte = 4"),
+        (AMPLIFIER, "[[signal]]", "value = \"1\"\nbits = [0, 1]"),
+        (AMPLIFIER, "[[signal]]", "value = \"1\"\nscale_expr = \"2\""),
+        (AMPLIFIER, "[[signal]]", "object = [1, 1]"),
+        (SCPI, "[[set]]", "register = 4"),
+        (SCPI, "[[set]]", "byte_order = \"DCBA\""),
+        (AMPLIFIER, "[[set]]", "send_zero = \"x\""),
+        (DRIVE, "[[set]]", "type = \"f32\""),
+        (RTU, "[emulator]", "names = [\"a\"]"),
+        (SCPI, "[[vector]]", "hex = \"00\""),
+        (AMPLIFIER, init, "copy = [1, 2, 3]\ntable = \"coil\""),
+        (CHAMBER, init, "registers = [1, [1]]"),
+        (DATAGRAMS, init, "send = \"x\"\nexpect = [\"y\"]"),
+        (SCPI, init, "hex = \"00\""),
+    ];
+    for (text, section, keys) in wrong {
+        let line = format!("{section}\n{keys}\n");
+        let text = match text.contains(&format!("{section}\n")) {
+            true => text.replacen(&format!("{section}\n"), &line, 1),
+            false => format!("{text}\n{line}"),
+        };
+        let said = read(&text, DBC).expect_err(keys).to_string();
+        assert!(said.contains(" is not read ") && said.starts_with("line "), "{section} {keys}: {said}");
+    }
+}
+
+/// What a role or a clock would leave unread.
+#[test]
+fn a_value_that_its_role_does_not_judge_is_refused() {
+    let marked = changed(STAGE, "name = \"position\"", "name = \"position\"\nvalid_when = \"velocity < 1\"");
+    for (what, text, cause) in [
+        ("a validity that a stage does not read", marked, "`valid_when`"),
+        (
+            "a clock that nobody reads",
+            changed(STAGE, "stamp = \"device\"", "stamp = \"arrival\""),
+            "device_time",
+        ),
+        ("a clock that is not there", changed(STAGE, "device_time = \"time\"", ""), "device_time"),
+        (
+            "a byte order in a line",
+            changed(SCPI, "[[signal]]", "[[signal]]\nbyte_order = \"DCBA\""),
+            "byte order",
+        ),
+        (
+            "a chamber on a serial line",
+            CHAMBER
+                .replace("modbus_tcp\"", "modbus_rtu\"\nbaud = 9600\nformat = \"8N1\"")
+                .replace("port = 1502\n", "")
+                .replace("connect_timeout_ms = 1000\n", ""),
+            "ModbusTcp",
+        ),
+    ] {
+        let said = read(&text, DBC).expect_err(what).to_string();
+        assert!(said.contains(cause) && said.starts_with("line "), "{what}: {said}");
+    }
+}
+
+/// The driver of CANopen commands a drive of CiA 402; `check` approved an amplifier that it could not drive.
+#[test]
+fn a_canopen_profile_that_the_driver_cannot_drive_is_refused() {
+    let parse = |text: &str| Profile::parse_with(text, &|_| Some(EDS.to_string()));
+    parse(DRIVE).unwrap_or_else(|error| panic!("{error}"));
+    let at = DRIVE.find("[[set]]\nname = \"control\"").unwrap();
+    let end = at + DRIVE[at..].find("\n\n").unwrap();
+    let second = "[[message]]\nname = \"more\"\ncob = 0x180\nlength = 8\nrate_hz = 9\n\n[[signal]]\nframe = \"actual\"";
+    for (what, text, cause) in [
+        (
+            "an amplifier",
+            changed(DRIVE, "\"motion.slide\"", "\"motion.slide\", \"force.lateral\""),
+            "`motion.slide`",
+        ),
+        ("no status", DRIVE.replace("statusword", "state"), "`statusword`"),
+        ("no control word", format!("{}{}", &DRIVE[..at], &DRIVE[end..]), "`control`"),
+        (
+            "two messages",
+            changed(
+                &DRIVE
+                    .replace("object = [0x2", "frame = \"actual\"\nobject = [0x2")
+                    .replace("object = [0x6064", "frame = \"actual\"\nobject = [0x6064"),
+                "[[signal]]",
+                second,
+            ),
+            "one [[message]]",
+        ),
+    ] {
+        let said = parse(&text).expect_err(what).to_string();
+        assert!(
+            said.contains("CiA 402") && said.contains(cause) && said.starts_with("line "),
+            "{what}: {said}"
+        );
     }
 }

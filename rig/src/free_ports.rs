@@ -137,7 +137,7 @@ mod tests {
         let listener = TcpListener::bind("127.0.0.1:0").unwrap();
         let there = listener.local_addr().unwrap().to_string();
         let text = include_str!("../../docs/profiles/ascii-generator.toml");
-        let text = text.replacen("kind = \"serial\"", "kind = \"tcp\"", 1);
+        let text = text.replacen("\"serial\"\nbaud = 115200\nformat = \"8N1\"", "\"tcp\"", 1);
         let source = Source { id: "own".into(), origin: "own".into(), text, files: Vec::new() };
         let tcp = InstrumentSetup { source: Some(source.into()), ..InstrumentSetup::new("own", &there) };
         assert_eq!(opens(&tcp), Ok(()));

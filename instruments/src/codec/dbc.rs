@@ -272,6 +272,16 @@ impl DbcSignal {
         if self.size >= 64 { u64::MAX } else { (1 << self.size) - 1 }
     }
 
+    /// So many of its bits, counted from the least significant one, as a number of their own; `None` where it
+    /// has not all of them, or is more than a whole number.
+    pub fn part(&self, (first, size): (u32, u32)) -> Option<Self> {
+        let (first, size) = (u16::try_from(first).ok()?, u16::try_from(size).ok().filter(|size| *size > 0)?);
+        let last = first.checked_add(size - 1).filter(|last| *last < self.size)?;
+        let start = self.bits().nth((if self.little_endian { first } else { last }).into())?;
+        let whole = !self.float && (self.factor, self.offset) == (1.0, 0.0);
+        whole.then_some(Self { start: u16::try_from(start).ok()?, size, signed: false, ..*self })
+    }
+
     fn fits(&self, length: usize) -> bool {
         (1..=64).contains(&self.size) && self.bits().all(|bit| bit / 8 < length)
     }

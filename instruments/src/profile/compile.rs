@@ -36,6 +36,7 @@ impl Compiler<'_> {
     pub fn compile(&self) -> Result<Profile, ProfileError> {
         let d = self.description;
         self.check_header()?;
+        self.check_keys()?;
         self.check_sections()?;
         let messages = self.dbc()?;
         let sheet = self.eds()?;
@@ -58,6 +59,7 @@ impl Compiler<'_> {
             let echo = set.echo.as_deref().and_then(index);
             self.check_echo(set, compiled, echo, echo.map(|at| &frames[signals[at].frame.0]))?;
         }
+        self.check_cia402(&sets)?;
         self.check_emulator(&index)?;
         self.check_frames(&frames, &signals)?;
         Ok(Profile { description: d.clone(), frames, signals, sets, signatures, faults, by_name })
@@ -125,7 +127,7 @@ impl Compiler<'_> {
     /// Where an object stands in its process data, by the data sheet.
     fn mapped(
         &self,
-        object: Option<eds::Key>,
+        (object, bits): (Option<eds::Key>, Option<(u32, u32)>),
         first: u16,
         cob: Option<u32>,
         sheet: &Objects,
@@ -139,7 +141,7 @@ impl Compiler<'_> {
         let number = sheet.get(&object).and_then(eds::Object::number);
         let number = number.ok_or_else(|| error(&"the object is not a number of at most 32 bits"))?;
         // CANopen is little endian throughout.
-        Ok(Field { at, number, order: ByteOrder::Dcba, bits: None })
+        Ok(Field { at, number, order: ByteOrder::Dcba, bits })
     }
 
     /// All frames, in the order that indices follow.
@@ -307,16 +309,10 @@ impl Compiler<'_> {
                     FrameKind::Messages(group, _) => self.description.message[group].cob,
                     _ => None,
                 };
-                Place::Bytes(self.mapped(s.object, 0x1800, cob, sheet, &s.name)?)
+                Place::Bytes(self.mapped((s.object, s.bits), 0x1800, cob, sheet, &s.name)?)
             }
             None => self.place(s, &frames[frame], messages)?,
-            Some(value) => {
-                if s.has_place() || s.dbc.is_some() {
-                    let message = format!("signal `{name}` is worked out: it stands nowhere and has no type");
-                    return Err(wrong(message));
-                }
-                Place::Computed(Expression::compile(value, index).map_err(in_signal)?)
-            }
+            Some(value) => Place::Computed(Expression::compile(value, index).map_err(in_signal)?),
         };
         if let Place::Bytes(field) = &place {
             let bit =
@@ -399,11 +395,16 @@ impl Compiler<'_> {
             let which = replies.iter().position(|reply| reply == message).ok_or_else(unknown)?;
             let before =
                 replies[..which].iter().filter_map(|reply| messages.get(reply)).map(|m| m.length).sum();
-            return Ok(Place::Dbc(before, *signal));
+            let part = s.bits.map_or(Some(*signal), |bits| signal.part(bits));
+            let part = part.ok_or_else(|| {
+                let why = format!("`bits` of signal `{name}`: `{path}` has not these bits, or is scaled");
+                wrong(why).with_help("only a whole number without factor and offset is parted")
+            })?;
+            return Ok(Place::Dbc(before, part));
         }
         let text_answer = frame.text.is_some();
-        if text_answer && (s.has_place() || s.bits.is_some()) {
-            let has = "is in a line of text: it has no register, byte, type or bits";
+        if text_answer && s.has_place() {
+            let has = "is in a line of text: it has no register, byte, type, byte order or bits";
             return Err(wrong(format!("signal `{name}` {has}")));
         }
         if let Some(Form::Pattern(pattern)) = &frame.text {
@@ -457,7 +458,7 @@ impl Compiler<'_> {
             None => return Err(wrong(format!("set-point `{name}` needs `block` or `send`"))),
         };
         let field = if s.object.is_some() {
-            self.mapped(s.object, 0x1400, blocks[block].cob, sheet, &s.name)?
+            self.mapped((s.object, None), 0x1400, blocks[block].cob, sheet, &s.name)?
         } else {
             let number = s.number.ok_or_else(|| wrong(format!("set-point `{name}` needs `type`")))?;
             Field { at: 2 * usize::from(s.register), number, order: s.byte_order, bits: None }

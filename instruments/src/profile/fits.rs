@@ -1,14 +1,13 @@
-//! What the types of a profile cannot say: what its kind of link can carry, and what a role needs. Whatever
-//! would be ignored is refused.
+//! What the types of a profile cannot say: what its kind of link can carry, and what a role needs.
 
 mod frames;
 
 use super::compile::Compiler;
-use super::{Frame, FrameKind};
+use super::{CompiledSet, Frame, FrameKind};
 use crate::codec::can::CanFrame;
 use crate::codec::from_hex;
 use crate::error::ProfileError;
-use crate::schema::{Init, LinkKind, Message, Role, Set, Table};
+use crate::schema::{Init, LinkKind, Message, Role, Set, Stamp, Table};
 
 /// What a role needs: signals, and set-points.
 const NEEDS: &[(Role, &[&str], &[&str])] = &[
@@ -96,34 +95,11 @@ impl Compiler<'_> {
         Ok(())
     }
 
-    /// Sections, by the kind of link that carries them.
+    /// What each section says, by the kind of link that carries it.
     pub(super) fn check_sections(&self) -> Result<(), ProfileError> {
-        use LinkKind::{Can, Canopen, ModbusRtu, ModbusTcp, Scpi, Serial, Sysfs, Tcp, Udp};
         let d = self.description;
-        let rows: [(&str, bool, &[LinkKind]); 6] = [
-            ("[[poll]]", !d.poll.is_empty(), &[ModbusTcp, ModbusRtu]),
-            ("[stream]", d.stream.is_some(), &[ModbusRtu, Serial, Tcp, Udp]),
-            ("[[message]]", !d.message.is_empty(), &[Can, Canopen]),
-            ("[[query]]", !d.query.is_empty(), &[Serial, Tcp, Scpi, Sysfs]),
-            ("[[write]]", !d.write.is_empty(), &[ModbusTcp, ModbusRtu, Canopen]),
-            ("[[set]]", !d.set.is_empty(), &[ModbusTcp, ModbusRtu, Canopen, Serial, Tcp, Scpi]),
-        ];
-        for (section, used, kinds) in rows {
-            if used && !kinds.contains(&d.link.kind) {
-                return self.refuse(section, format!("a link of kind {:?} has no {section}", d.link.kind));
-            }
-        }
-        let text = matches!(d.link.kind, Serial | Tcp | Scpi);
-        let words = d.link.error_query.is_some() || d.link.choice.is_some() || !d.link.unsolicited.is_empty();
-        if words && !text {
-            return self.refuse("[link]", "`error_query`, `choice` and `unsolicited` are for lines of text");
-        }
-        for (key, file, kind) in [("dbc", &d.link.dbc, Can), ("eds", &d.link.eds, Canopen)] {
-            let Some(file) = file else { continue };
-            if d.link.kind != kind {
-                return self.refuse("[link]", format!("`{key}` is for a link of kind {kind:?}"));
-            }
-            if file.contains(['/', '\\']) {
+        for (key, file) in [("dbc", &d.link.dbc), ("eds", &d.link.eds)] {
+            if file.as_ref().is_some_and(|file| file.contains(['/', '\\'])) {
                 return self.refuse("[link]", format!("`{key}`: the file must be beside the profile"));
             }
         }
@@ -158,21 +134,16 @@ impl Compiler<'_> {
         }
         for query in &d.query {
             let (name, send) = (query.name.as_ref(), &query.send);
-            if d.link.kind == Sysfs && (send.is_empty() || send.starts_with('.') || send.contains(['/', ' ']))
+            if d.link.kind == LinkKind::Sysfs
+                && (send.is_empty() || send.starts_with('.') || send.contains(['/', ' ']))
             {
                 let problem = format!("query `{name}`: `{send}` is no name of an attribute");
                 return Err(self.at_name(&query.name, problem));
             }
-            let forms = [query.length.is_some(), query.unit.is_some(), query.answer.is_some()];
-            if forms.iter().filter(|x| **x).count() > 1 {
-                let problem = format!("query `{name}` takes one of `length`, `unit` and `answer`");
-                return Err(self.at_name(&query.name, problem));
-            }
         }
-        if let Some(set) = d.set.iter().find(|set| text != set.send.is_some()) {
-            let (lines, none) =
-                ("needs `send`: its link speaks in lines", "has `send`, and no lines to send");
-            let problem = format!("set-point `{}` {}", set.name.as_ref(), if text { lines } else { none });
+        let lines = matches!(d.link.kind, LinkKind::Serial | LinkKind::Tcp | LinkKind::Scpi);
+        if let Some(set) = d.set.iter().find(|set| lines && set.send.is_none()) {
+            let problem = format!("set-point `{}` needs `send`: its link speaks in lines", set.name.as_ref());
             return Err(self.at_name(&set.name, problem));
         }
         self.check_roles()
@@ -182,9 +153,7 @@ impl Compiler<'_> {
     fn check_udp(&self) -> Result<(), ProfileError> {
         let d = self.description;
         let (datagrams, local_port) = (d.link.kind == LinkKind::Udp, d.link.local_port.is_some());
-        let why = if !datagrams && local_port {
-            "`local_port` is for a link of kind Udp"
-        } else if datagrams && d.stream.is_none() {
+        let why = if datagrams && d.stream.is_none() {
             "a link of kind Udp needs a [stream]"
         } else if datagrams && !local_port && d.init.is_empty() {
             "a link of kind Udp needs `local_port`, or an [[init]] that tells the instrument where to send"
@@ -218,41 +187,27 @@ impl Compiler<'_> {
         Ok(())
     }
 
-    /// One [[init]] does one thing, and one that its link can carry.
+    /// One [[init]] does one thing.
     fn check_init(&self, init: &Init) -> Result<(), ProfileError> {
-        use LinkKind::{Can, Canopen, ModbusRtu, ModbusTcp, Scpi, Serial, Sysfs, Tcp, Udp};
-        let acts: [(&str, bool, &[LinkKind]); 7] = [
-            ("send", init.send.is_some(), &[Serial, Tcp, Udp, Scpi, Sysfs]),
-            ("hex", init.hex.is_some(), &[Serial, Tcp, Udp]),
-            ("can", init.can.is_some(), &[Can]),
-            ("function", init.function.is_some(), &[ModbusRtu]),
-            ("copy", init.copy.is_some(), &[ModbusTcp, ModbusRtu]),
-            ("registers", init.registers.is_some(), &[ModbusTcp, ModbusRtu]),
-            ("sdo", init.sdo.is_some(), &[Canopen]),
-        ];
+        let text = [init.send.is_some(), init.hex.is_some()];
+        let bus = [init.can.is_some(), init.sdo.is_some()];
+        let modbus = [init.function.is_some(), init.copy.is_some(), init.registers.is_some()];
+        let acts = text.iter().chain(&bus).chain(&modbus).filter(|used| **used).count();
         let no_frame = |(id, data): &(u32, Vec<u8>)| CanFrame::build(*id, *id > 0x7FF, data).is_none();
         let no_bytes = |hex: &str| from_hex(hex).is_none_or(|bytes| bytes.is_empty());
-        let used: Vec<&(&str, bool, &[LinkKind])> = acts.iter().filter(|(_, used, _)| *used).collect();
-        let kind = self.description.link.kind;
-        let problem = match used.as_slice() {
-            [(_, _, kinds)] if kinds.contains(&kind) => match &init.registers {
-                Some((_, values)) if values.is_empty() || values.len() > 123 => {
-                    "one write takes 1 to 123 registers".into()
-                }
-                Some(_) if !matches!(init.table, Table::Holding | Table::Coil) => {
-                    "only holding registers and coils can be written".into()
-                }
-                _ if init.can.as_ref().is_some_and(no_frame) => {
-                    "`can` has an identifier of 29 bits at most, and 8 bytes at most".into()
-                }
-                _ if init.hex.as_deref().is_some_and(no_bytes) => "`hex` is not bytes in hexadecimal".into(),
-                _ if init.expect.is_some() && (init.send.is_none() || kind == Udp) => {
-                    "only `send` has an answer to `expect`".into()
-                }
-                _ => return Ok(()),
-            },
-            [(act, ..)] => format!("a link of kind {kind:?} has no `{act}`"),
-            _ => "does one thing: send, hex, can, function, copy, registers or sdo".to_string(),
+        let problem = match &init.registers {
+            _ if acts != 1 => "does one thing: send, hex, can, function, copy, registers or sdo",
+            Some((_, values)) if values.is_empty() || values.len() > 123 => {
+                "one write takes 1 to 123 registers"
+            }
+            Some(_) if !matches!(init.table, Table::Holding | Table::Coil) => {
+                "only holding registers and coils can be written"
+            }
+            _ if init.can.as_ref().is_some_and(no_frame) => {
+                "`can` has an identifier of 29 bits at most, and 8 bytes at most"
+            }
+            _ if init.hex.as_deref().is_some_and(no_bytes) => "`hex` is not bytes in hexadecimal",
+            _ => return Ok(()),
         };
         self.refuse("[[init]]", format!("an [[init]]: {problem}"))
     }
@@ -268,7 +223,23 @@ impl Compiler<'_> {
             let problem = |what: String| {
                 self.refuse("[profile]", format!("an instrument of role {role:?} needs {what}"))
             };
+            let kind = match role {
+                Role::AmbientChamber => LinkKind::ModbusTcp,
+                Role::MeasureVibration => LinkKind::Serial,
+                _ => d.link.kind,
+            };
+            if kind != d.link.kind {
+                return problem(format!("a link of kind {kind:?}"));
+            }
             for (_, signals, sets) in NEEDS.iter().filter(|(named, ..)| named == role) {
+                let mut marked =
+                    d.signal.iter().filter(|signal| signal.valid_when.is_some()).map(|s| &s.name);
+                if let Some(name) = marked.find(|name| signals.contains(&name.as_ref().as_str())) {
+                    let why = format!("{role:?} reads `{}` whatever `valid_when` says", name.as_ref());
+                    return Err(self
+                        .at_name(name, why)
+                        .with_help("a [[fault]] of severity stop ends the run"));
+                }
                 if let Some(missing) = signals.iter().find(|name| !signal(name)) {
                     return problem(format!("a signal `{missing}`"));
                 }
@@ -285,8 +256,36 @@ impl Compiler<'_> {
                 return problem("a signal".into());
             }
         }
+        let clock = d.poll.iter().any(|poll| poll.device_time.is_some());
+        if clock != (d.time.stamp == Stamp::Device) {
+            let why = "`device_time` of a [[poll]] and `stamp = \"device\"` of [time] belong together";
+            return self.refuse(if clock { "device_time" } else { "[time]" }, why);
+        }
         self.check_heartbeat()?;
         self.check_commanded()
+    }
+
+    /// Over CANopen the driver commands a drive of CiA 402 in profile velocity mode, and nothing else.
+    pub(super) fn check_cia402(&self, sets: &[CompiledSet]) -> Result<(), ProfileError> {
+        let d = self.description;
+        let stage = |role: &Role| matches!(role, Role::MotionSlide | Role::MotionLoad);
+        let first = |set: &CompiledSet| set.block.is_some_and(|(_, field)| (field.at, field.end()) == (0, 2));
+        let mut controls = d.set.iter().zip(sets).filter(|(set, _)| set.name.as_ref() == "control");
+        let missing = if d.link.kind != LinkKind::Canopen {
+            return Ok(());
+        } else if !(d.profile.roles.contains(&Role::MotionSlide) && d.profile.roles.iter().all(stage)) {
+            "the role `motion.slide`, and no other but `motion.load`"
+        } else if !d.signal.iter().any(|signal| signal.name.as_ref() == "statusword") {
+            "a signal `statusword` (object 0x6041)"
+        } else if !controls.any(|(_, set)| first(set)) {
+            "a set-point `control` (object 0x6040), the first two bytes of its block"
+        } else if d.message.len() != 1 || d.write.len() != 1 || d.write[0].cob.is_none() {
+            "one [[message]] and one [[write]], each with `cob`"
+        } else {
+            return Ok(());
+        };
+        let why = "CANopen is for drives of CiA 402 in profile velocity mode";
+        self.refuse("[link]", format!("{why}: the profile needs {missing}"))
     }
 
     /// Only a heartbeat has a time that the instrument waits for the next one.

@@ -28,13 +28,14 @@ pub struct Signal {
     pub object: Option<(u16, u8)>,
     /// `message.signal` of the DBC file, in place of register, byte and type.
     pub dbc: Option<String>,
-    /// Type; left out for DBC signals and for lines of text.
+    /// Type; left out for DBC signals, for objects and for lines of text.
     #[serde(rename = "type", default)]
     pub number: Option<NumberType>,
     /// Byte order.
     #[serde(default)]
     pub byte_order: ByteOrder,
-    /// First bit and width, where only a part of the number counts.
+    /// First bit (from the least significant) and width, where only a part of the number counts; also of an
+    /// object, and of a whole number of a DBC file.
     pub bits: Option<(u32, u32)>,
     /// Counts times this are `unit`s.
     #[serde(default = "one")]
@@ -67,7 +68,8 @@ pub struct Signal {
 impl Signal {
     /// Whether it states where in its frame it stands, or as what.
     pub fn has_place(&self) -> bool {
-        self.register.is_some() || self.address.is_some() || self.byte.is_some() || self.number.is_some()
+        let placed = self.register.is_some() || self.address.is_some() || self.byte.is_some();
+        placed || self.number.is_some() || self.bits.is_some() || self.byte_order != ByteOrder::default()
     }
 }
 

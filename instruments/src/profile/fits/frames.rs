@@ -18,8 +18,6 @@ impl Compiler<'_> {
             format!("has {count} registers; one read takes 1 to {MOST_REGISTERS}")
         } else if stated.is_some_and(past) {
             "runs past register 65535".into()
-        } else if stated.is_some() && poll.gap != 0 {
-            "has a `gap`, which is for signals with an `address` of their own".into()
         } else if poll.address.is_some() != poll.count.is_some() {
             "needs both `address` and `count`, or neither".into()
         } else if !read {
@@ -55,31 +53,20 @@ impl Compiler<'_> {
         let (line, length, check) = (stream.line.is_some(), stream.length.map(usize::from), stream.check);
         let (sync, check_from) = (stream.sync.len(), usize::from(stream.check_from));
         let around = check.map(|check| check_from.max(sync) + check.length());
-        let why = if line && !(free && length.is_none() && check.is_none() && sync == 0) {
-            "`line` is for links of kind Serial, Tcp and Udp, and goes without length, check and sync"
-        } else if !line && (length.is_none() || check.is_none() && d.link.kind != LinkKind::Udp) {
+        let why = if !line && (length.is_none() || check.is_none() && d.link.kind != LinkKind::Udp) {
             "`length` and `check` are needed, or `line`: without a check a stream cannot be trusted"
         } else if check.is_none() && length.is_some_and(|length| length <= sync) {
             "`length` leaves no byte after sync"
-        } else if check.is_none()
-            && !line
-            && (check_from != 0 || stream.check_order.is_some() || stream.believed_after != 1)
-        {
-            "`check_from`, `check_order` and `believed_after` belong to a `check`"
         } else if length.zip(around).is_some_and(|(length, around)| length <= around) {
             "`length` leaves no byte between sync and check"
         } else if !(stream.rate_hz > 0.0 && stream.rate_hz <= FASTEST_HZ) {
             "a `rate_hz` is above 0 and at most 20000"
-        } else if free && (starts || stream.stop.is_some() || stream.stop_before_open) {
-            "on a link of kind Serial, Tcp or Udp it runs by itself; [[init]] `send` may start it"
         } else if free && !(d.query.is_empty() && d.set.is_empty()) {
             "it leaves no room for [[query]] and [[set]] on its line"
         } else if !free && starts && stream.stop.is_none() {
             "what is started needs `stop`"
         } else if !free && !starts {
             "needs `start_register` or `start_function`; one that runs by itself is of kind `serial`, `tcp` or `udp`"
-        } else if stream.stop_before_open && stream.stop.is_none() {
-            "`stop_before_open` needs `stop`"
         } else if d.poll.iter().any(|poll| poll.rate_hz.is_some()) {
             "while it runs nothing is polled: polls can be read `once`"
         } else {
