@@ -27,7 +27,7 @@ fn every_cause_has_a_unit_a_requirement_and_a_remedy_of_its_own_kind() {
 fn tripped(request: Request, change: impl Fn(&mut Observation)) -> Trip {
     let mut bench = Bench::armed();
     bench.request = request;
-    for _ in 0..400 {
+    for _ in 0..1000 {
         if let Some(trip) = bench.cycle(&change, Controls::default()).tripped {
             return trip;
         }
