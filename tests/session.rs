@@ -42,6 +42,18 @@ fn the_story_of_the_readme_ends_with_a_model_that_agrees() {
         let compared = said(&["compare", "first", seed]);
         assert!(compared.starts_with("no difference seen") && compared.contains("  model: "), "{compared}");
     }
+    // What was measured does not depend on the model that it is compared with.
+    let measured = |run: &str| -> Vec<String> {
+        said(&["export", run, "--to", "csv", "--out", "table.csv"]);
+        let text = std::fs::read_to_string(folder.path().join("table.csv")).unwrap();
+        let rows: Vec<Vec<&str>> = text.lines().map(|line| line.split(',').collect()).collect();
+        let at = rows[0].iter().position(|name| *name == "mu_relative").unwrap();
+        std::fs::remove_file(folder.path().join("table.csv")).unwrap();
+        rows[1..].iter().map(|row| row[at].to_string()).collect()
+    };
+    said(&["run", "--fast", "--model", "psi", "--out", "psi"]);
+    let (first, psi) = (measured("first"), measured("psi"));
+    assert!(first.iter().filter(|mu| !mu.is_empty()).count() > 80 && first == psi, "{first:?} {psi:?}");
     // The same sweep again is no second measurement, and another world is told from this one.
     said(&["run", "--fast", "--out", "again"]);
     let compared = said(&["compare", "first", "again"]);

@@ -9,6 +9,7 @@ use crate::run_dir::{differences, missing_records, of_record, open_record, passe
 use crate::sequence::{MeasuredPass, Outcome};
 use crate::session::Summary;
 use models::finger::Finger;
+use models::pass::{Pass, coulomb_coefficient};
 use realtime::recorder::{self, Entry};
 use std::collections::BTreeMap;
 use std::path::Path;
@@ -21,7 +22,8 @@ pub struct RunData {
     pub facts: BTreeMap<String, String>,
     /// Files that the record holds, by name: setup, plan, rig.toml, certificates, model, profiles.
     pub files: BTreeMap<String, Vec<u8>>,
-    /// The passes with their comparisons.
+    /// The passes with their comparisons. Measured `mu'` is over the `mu_0` of all passes without vibration, as
+    /// in `muprime compare`; the loop had the estimate so far, which the model moves.
     pub passes: Vec<MeasuredPass>,
     /// Events with loop time in s.
     pub events: Vec<(f64, serde_json::Value)>,
@@ -52,7 +54,7 @@ impl RunData {
 
 /// Reads a run's folder.
 pub fn read(folder: &Path) -> miette::Result<RunData> {
-    let passes = passes_in(folder)?;
+    let mut passes = passes_in(folder)?;
     let mut facts = BTreeMap::new();
     let mut files = BTreeMap::new();
     let mut events = Vec::new();
@@ -79,10 +81,28 @@ pub fn read(folder: &Path) -> miette::Result<RunData> {
         damage.extend(of_record(&path, reader.integrity().clone()));
     }
     damage.extend(differences(folder, &passes)?);
+    let mu0 = restated(&mut passes);
     let summary =
         std::fs::read(folder.join("summary.json")).ok().and_then(|b| serde_json::from_slice(&b).ok());
     let rig = rig_file(&folder.join("rig.toml"))?;
-    let about = about::of_run(folder, &facts, Some(&rig));
+    let mut about = about::of_run(folder, &facts, Some(&rig));
+    about.extend(mu0.map(|mu0| ("mu_0", format!("{mu0:.4}, of all passes without vibration"))));
     let fidelity = fidelity::read(folder);
     Ok(RunData { about, facts, files, passes, events, summary, finger: rig.finger, fidelity, damage })
+}
+
+/// Takes the run's own `mu_0` for the measured `mu'` of every pass that has one, and returns it. The standard
+/// uncertainty keeps its share of the value: that of `mu_0` is the larger one of the time of the pass.
+fn restated(passes: &mut [MeasuredPass]) -> Option<f64> {
+    let plain: Vec<Pass> = passes.iter().map(|p| p.pass.clone()).collect();
+    let mu0 = coulomb_coefficient(&plain).filter(|mu0| *mu0 > 0.0)?;
+    for MeasuredPass { pass, comparison, .. } in passes {
+        let Some((friction, found)) = pass.friction_force_n().zip(comparison.as_mut()) else { continue };
+        let Some(before) = found.mu_relative else { continue };
+        let mu = friction / (mu0 * pass.normal_force_n);
+        let share = if before == 0.0 { 1.0 } else { mu / before };
+        found.mu_relative_sd = found.mu_relative_sd.map(|sd| sd * share);
+        found.mu_relative = Some(mu);
+    }
+    Some(mu0)
 }

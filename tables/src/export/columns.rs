@@ -90,7 +90,11 @@ pub fn of(passes: &[MeasuredPass]) -> Table {
         counts("replicate", "repeat of the condition", &|p| p.pass.replicate),
         texts("run", "name of the run, in tables of several", &|p| p.pass.run.clone()),
         counts("session", "session of the run, from 1", &|p| p.pass.session),
-        compared("mu_relative", "relative friction mu' = mu / mu_0, measured", &|c| c.mu_relative),
+        compared(
+            "mu_relative",
+            "relative friction mu' = mu / mu_0, measured; mu_0 of all passes without vibration",
+            &|c| c.mu_relative,
+        ),
         compared("mu_relative_sd", "standard uncertainty of the measured mu'", &|c| c.mu_relative_sd),
         compared("mu_relative_predicted", "mu' that the model predicts at the measured condition", &|c| {
             Some(c.predicted)

@@ -28,7 +28,7 @@ pub fn of(run: &RunData, stated: &Stated) -> Facts {
     if !instruments.is_empty() {
         facts.insert("instruments".into(), instruments.join(", "));
     }
-    let about = ["date", "certificates", "stiffness", "repeatability"];
+    let about = ["date", "certificates", "stiffness", "repeatability", "mu_0"];
     let about = run.about.iter().filter(|(name, _)| about.contains(name));
     facts.extend(about.map(|(name, words)| (name.to_string(), words.clone())));
     facts.extend(run.summary.iter().map(|s| ("outcome".to_string(), outcome(s))));
