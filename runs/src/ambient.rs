@@ -51,6 +51,26 @@ impl MeasuredPass {
         let [ambient_pressure_pa, temperature_c, relative_humidity_pct] = AIR.map(|(c, _)| planned(c));
         Ambient { ambient_pressure_pa, temperature_c, relative_humidity_pct }
     }
+
+    /// The levels of these quantities: the plan's, else what was found.
+    pub fn air(&self, of: OfAir<bool>) -> OfAir<Option<f64>> {
+        let (set, found) = (values(&self.levels_set()), values(&Ambient::of(&self.pass.condition(1.0))));
+        std::array::from_fn(|at| set[at].or(found[at]).filter(|_| of[at]))
+    }
+}
+
+/// Quantities of the air that the plan of some passes sets: their levels are part of a condition.
+pub fn air_set(passes: &[MeasuredPass]) -> OfAir<bool> {
+    std::array::from_fn(|at| passes.iter().any(|p| values(&p.levels_set())[at].is_some()))
+}
+
+/// Whether the levels of two passes are one.
+pub fn one_air([a, b]: [OfAir<Option<f64>>; 2]) -> bool {
+    let within = Tolerances::default().of_air();
+    (0..AIR.len()).all(|at| match (a[at], b[at]) {
+        (Some(x), Some(y)) => (x - y).abs() <= within[at],
+        (x, y) => x == y,
+    })
 }
 
 /// Where a value comes from.

@@ -4,7 +4,7 @@
 //! them in proportion. Differences therefore carry a full covariance, the scatter of passes on its diagonal and a term of rank one
 //! for the references of both runs. Calibration that both runs share (gains, stiffnesses) cancels in a difference and is left out.
 
-use crate::ambient::{OfAir, Tolerances, air_words, values};
+use crate::ambient::{OfAir, air_set, air_words, one_air, values};
 use crate::human::{p_value, quantity};
 use crate::report::levels;
 use crate::run_data::RunData;
@@ -251,18 +251,12 @@ pub struct Comparison {
 impl Side {
     /// The passes of a run.
     pub fn of(run: &RunData, noise: PassNoise) -> Self {
-        let mut sets = OfAir::default();
         let at_level = |p: &MeasuredPass| {
-            let set = values(&p.levels_set());
-            sets = std::array::from_fn(|at| sets[at] || set[at].is_some());
-            let mut pass = p.pass.clone();
-            let found =
-                [&mut pass.ambient_pressure_pa, &mut pass.temperature_c, &mut pass.relative_humidity_pct];
-            found.into_iter().zip(set).for_each(|(found, set)| *found = set.or(*found));
-            pass
+            let [ambient_pressure_pa, temperature_c, relative_humidity_pct] = p.air([true; 3]);
+            Pass { ambient_pressure_pa, temperature_c, relative_humidity_pct, ..p.pass.clone() }
         };
         let passes = run.passes.iter().map(at_level).collect();
-        Side { passes, sets, noise }
+        Side { passes, sets: air_set(&run.passes), noise }
     }
 
     /// `mu_0` by least squares over the passes without vibration; an error says why there is none.
@@ -319,14 +313,9 @@ fn air_of(p: &Pass, set: &OfAir<bool>) -> Ambient {
 
 fn same(a: &Pass, b: &Pass, set: &OfAir<bool>) -> bool {
     let near = |((x, y), within): ((f64, f64), f64)| (x - y).abs() <= within * x.abs().max(y.abs());
-    let airs = [a, b].map(|p| values(&air_of(p, set)));
-    let level = |at: usize| match [airs[0][at], airs[1][at]] {
-        [Some(x), Some(y)] => (x - y).abs() <= Tolerances::default().of_air()[at],
-        [x, y] => x == y,
-    };
     a.direction == b.direction
         && settings(a).into_iter().zip(settings(b)).zip(SAME).all(near)
-        && (0..airs[0].len()).all(level)
+        && one_air([a, b].map(|p| values(&air_of(p, set))))
 }
 
 /// The passes with vibration of some runs by their condition: its first pass, and the passes of each run.

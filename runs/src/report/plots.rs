@@ -132,7 +132,13 @@ impl Ranged for Axis {
     fn key_points<Hint: KeyPointHint>(&self, hint: Hint) -> Vec<f64> {
         match self {
             Axis::Linear(axis) => axis.key_points(hint),
-            Axis::Logarithmic(axis) => axis.key_points(hint),
+            // Two powers of ten are no scale.
+            Axis::Logarithmic(axis) => {
+                Some(axis.key_points(hint)).filter(|p| p.len() > 2).unwrap_or_else(|| {
+                    let steps = (-30..30).flat_map(|n| [1.0, 2.0, 5.0].map(|k| k * 10f64.powi(n)));
+                    steps.filter(|at| axis.range().contains(at)).collect()
+                })
+            }
         }
     }
 
@@ -358,10 +364,10 @@ pub(crate) fn mu_axis(values: impl Iterator<Item = f64>) -> [f64; 2] {
 }
 
 /// What a caption says where a value lies beyond the ends of an axis.
-pub(crate) fn beyond(mut values: impl Iterator<Item = f64>, [low, high]: [f64; 2]) -> &'static str {
-    match values.any(|v| v < low || v > high) {
-        true => " Marks beyond the axis are drawn at its end.",
-        false => "",
+pub(crate) fn beyond(values: impl Iterator<Item = f64>, [low, high]: [f64; 2]) -> String {
+    match values.filter(|v| *v < low || *v > high).count() {
+        0 => String::new(),
+        n => format!(" Marks beyond the axis ({n}) are drawn at its end."),
     }
 }
 
@@ -434,7 +440,15 @@ mod tests {
     fn a_mark_is_where_it_was_measured_or_the_caption_says_that_it_is_not() {
         let caption = |values: &[f64]| beyond(values.iter().copied(), mu_axis(values.iter().copied()));
         assert_eq!(caption(&[-0.1, 0.4, 1.4]), "");
-        assert!(caption(&[0.4, 9.0]).contains("beyond the axis"));
+        assert!(caption(&[0.4, 9.0, 8.0]).contains("beyond the axis (2)"));
+    }
+
+    /// 5 to 50 mm/s had one label, 10.
+    #[test]
+    fn a_logarithmic_axis_of_one_decade_has_a_scale() {
+        let ticks = |low, high| Span::over([low, high].into_iter(), true).axis().key_points(5);
+        assert_eq!(ticks(4.99, 50.01), [5.0, 10.0, 20.0, 50.0]);
+        assert_eq!(ticks(0.01, 20.0), [0.01, 0.1, 1.0, 10.0]);
     }
 
     #[test]

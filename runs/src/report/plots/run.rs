@@ -4,7 +4,7 @@ use super::{
     AMPLITUDE, COLOURS, GREY, Span, WIDE, band, beyond, draw, edge_of, eq_20, figure, line, mark, measured,
     mu_axis, mu_on, series_key, wrong,
 };
-use crate::ambient::{air_words, values};
+use crate::ambient::{air_set, one_air, shown};
 use crate::human::number;
 use crate::report::html::escape;
 use crate::report::levels::{FORCE, FREQUENCY, Levels, SPEED};
@@ -28,9 +28,11 @@ fn at_base(passes: &[MeasuredPass]) -> Vec<&MeasuredPass> {
     let driven: Vec<&MeasuredPass> = passes.iter().filter(|p| p.pass.amplitude > PeakToPeak::ZERO).collect();
     let frequencies = Levels::of(driven.iter().map(|p| p.pass.frequency_hz), FREQUENCY);
     let loads = Levels::of(driven.iter().map(|p| p.pass.normal_force_n), FORCE);
+    let (set, mut airs) = (air_set(passes), Vec::new());
     let mut settings = std::collections::BTreeMap::<_, Vec<&MeasuredPass>>::new();
     for p in driven {
-        let air = values(&p.levels_set()).map(|level| level.map(f64::to_bits));
+        let air = airs.iter().position(|air| one_air([*air, p.air(set)])).unwrap_or(airs.len());
+        airs.extend((air == airs.len()).then(|| p.air(set)));
         let setting = (frequencies.index(p.pass.frequency_hz), loads.index(p.pass.normal_force_n), air);
         settings.entry(setting).or_default().push(p);
     }
@@ -99,7 +101,8 @@ pub fn mu_against_amplitude(run: &RunData) -> miette::Result<String> {
             " {n} passes at other frequencies, loads or levels of the air are in the table, not in this figure."
         ),
     };
-    let air: String = air_words(&chosen[0].levels_set()).map(|level| format!(", {level}")).collect();
+    let air = chosen[0].air(air_set(&run.passes)).into_iter().enumerate();
+    let air: String = air.filter_map(|(at, level)| Some(format!(", {}", shown(at, level?)))).collect();
     Ok(format!(
         "<figure>{svg}<figcaption>at {f} kHz and {load} N{air}. {}. Short strokes: what was predicted for each pass.{}{elsewhere}</figcaption></figure>",
         escape(&series_key(&speeds.names(), "mm/s")),
@@ -187,4 +190,59 @@ pub fn lateness(report: &LoopReport) -> miette::Result<String> {
         draw(chart, bars.iter().map(bar))
     })?;
     Ok(format!("<figure>{svg}</figure>"))
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::ambient::{Level, Source};
+    use models::pass::Pass;
+
+    fn run(passes: Vec<MeasuredPass>) -> RunData {
+        RunData {
+            about: Vec::new(),
+            facts: Default::default(),
+            files: Default::default(),
+            passes,
+            events: Vec::new(),
+            summary: None,
+            finger: crate::setup::Setup::load("virtual").unwrap().tip.finger,
+            fidelity: None,
+            damage: Vec::new(),
+        }
+    }
+
+    /// A pass at 2 um in air of this pressure, Pa, that its plan sets or leaves as it is.
+    fn pass(planned: Option<f64>, value: f64) -> MeasuredPass {
+        let at = Condition {
+            amplitude: PeakToPeak::from_metres(2e-6),
+            ambient_pressure_pa: Some(value),
+            ..Condition::paper()
+        };
+        let quantity = "ambient_pressure_pa".into();
+        let (range, source) = ([value; 2], Source::Simulated);
+        MeasuredPass {
+            pass: Pass::at(1, &at, Some(0.05)),
+            reference: false,
+            comparison: None,
+            regime: None,
+            psi_eq17: None,
+            temperature_flags: Vec::new(),
+            commanded_normal_force_n: None,
+            levels: vec![Level { quantity, planned, value, range, source, age_s: 0.0, lost: false }],
+        }
+    }
+
+    /// Air as it is and a planned level that is the same were two airs: the figure left out passes.
+    #[test]
+    fn air_as_it_is_and_the_same_air_planned_are_one_condition() {
+        let passes = [(None, 101_320.0), (Some(101_325.0), 101_330.0), (Some(50_000.0), 50_010.0)];
+        let passes = passes.into_iter().flat_map(|(planned, found)| vec![pass(planned, found); 3]).collect();
+        let caption = mu_against_amplitude(&run(passes)).unwrap();
+        assert!(caption.contains(" 3 passes at other frequencies, loads or levels of the air"), "{caption}");
+        assert!(caption.contains(", pressure 101.32 kPa."), "{caption}");
+        let weather = vec![pass(None, 101_320.0), pass(None, 98_000.0)];
+        let caption = mu_against_amplitude(&run(weather)).unwrap();
+        assert!(!caption.contains("passes at other") && !caption.contains("pressure"), "{caption}");
+    }
 }

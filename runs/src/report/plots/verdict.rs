@@ -99,7 +99,7 @@ pub fn law(
         line(chart, edge(0.0), COLOURS[0], None)?;
         rings(chart, passes.iter().filter(|p| p.suspect).map(|p| (p.x, cut(p.y))), size)
     })?;
-    let beyond = beyond(all(), axis);
+    let beyond = beyond(passes.iter().map(|p| p.y), axis);
     Ok(format!(
         "<figure>{svg}<figcaption>Grey, dashed: no change of the baseline.{beyond}</figcaption></figure>"
     ))
@@ -125,8 +125,9 @@ pub fn parity(points: &[(f64, f64, f64, bool)]) -> miette::Result<String> {
         Ok(format!("<figure>{svg}</figure>"))
     });
     let panels: miette::Result<Vec<String>> = panels.into_iter().collect();
-    let cut = beyond(all(), [bottom, top]);
-    Ok(format!("<div class=\"panels\">{}</div>{}", panels?.concat(), crate::report::html::note(cut)))
+    let furthest = |m, v: &f64| if (bottom..=top).contains(m) { *v } else { *m };
+    let cut = beyond(points.iter().flat_map(|(m, a, b, _)| [a, b].map(|v| furthest(m, v))), [bottom, top]);
+    Ok(format!("<div class=\"panels\">{}</div>{}", panels?.concat(), crate::report::html::note(&cut)))
 }
 
 /// Errors of passes in standard deviations against one covariate: hollow before a cause was added, filled after.
