@@ -321,3 +321,44 @@ fn recorded(record: &Path) -> Vec<(u64, Option<i64>)> {
     }
     all
 }
+
+/// The panels pooled two pressures under a line at one of them that nothing named. Odds had two forms, and
+/// the baseline two names.
+#[test]
+fn the_page_of_a_verdict_states_its_pressure_and_odds_as_the_terminal_does() {
+    let folder = tempfile::tempdir().unwrap();
+    let (plan, out) = (folder.path().join("air.toml"), folder.path().join("air"));
+    let text = "name = \"air\"\nseed = 5\nreplicates = 2\nreference_every = 5\n[pass]\nsettle_s = 0.1\nmeasure_s = 0.2\n\
+        [base]\namplitude_pp_m = 2e-6\nfrequency_hz = 27500\nspeed_m_s = 0.02\nnormal_force_n = 0.25\n[[series]]\n\
+        amplitude_pp_m = [0.4e-6, 0.8e-6, 1.35e-6, 2e-6, 2.5e-6]\n[[series]]\n\
+        amplitude_pp_m = [1.35e-6, 2.5e-6]\nambient_pressure_pa = [101325, 50000]\n";
+    std::fs::write(&plan, text).unwrap();
+    let made = muprime().args(["run", "--fast"]).arg(&plan).arg("--out").arg(&out).output().unwrap();
+    assert!(made.status.code().is_some_and(|code| code < 2), "{}", texts(&made).1);
+    let page = folder.path().join("verdict.html");
+    let said = muprime().arg("diagnose").arg(&out).arg("--report").arg(&page).output().unwrap();
+    let (said, html) = (texts(&said).0, std::fs::read_to_string(&page).unwrap());
+    let points = std::fs::read_to_string(out.join("points.csv")).unwrap();
+    let head: Vec<&str> = points.lines().next().unwrap().split(',').collect();
+    let at = |name: &str| head.iter().position(|one| *one == name).unwrap();
+    let (w, pa) = (at("amplitude_pp_m"), at("ambient_pressure_pa"));
+    let rows: Vec<Vec<f64>> = points
+        .lines()
+        .skip(1)
+        .map(|row| row.split(',').map(|v| v.parse().unwrap_or(f64::NAN)).collect())
+        .collect();
+    let driven = rows.iter().filter(|row| row[w] > 0.0);
+    let (thin, all) = (driven.clone().filter(|row| row[pa] < 6e4).count(), driven.count());
+    let shown = format!(
+        "{} of {all} passes with vibration, those at the conditions that are most common; {thin} at other pressures are left out.",
+        all - thin
+    );
+    assert!(thin > 0 && html.contains(&shown), "{shown}");
+    assert!(html.contains(" N, 101 kPa.</figcaption>"), "no pressure at the panel");
+    assert!(html.contains(">nominal baseline<") && !html.contains("baseline as calibrated"));
+    let odds = between(&html, " is true, ", " against ");
+    assert!(!odds.is_empty(), "the verdict has no next measurement: this test tries nothing");
+    for odds in odds {
+        assert!(said.contains(odds), "{odds}\n{said}");
+    }
+}

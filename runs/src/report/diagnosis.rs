@@ -70,7 +70,7 @@ fn described(result: &Diagnosis) -> String {
 fn how_far(result: &Diagnosis) -> String {
     let g = &result.report.gap;
     let stages = [
-        ("baseline as calibrated", g.before_rmse),
+        ("nominal baseline", g.before_rmse),
         ("recalibrated baseline", g.recalibrated_rmse),
         ("verdict's model", g.after_rmse),
         ("repeatability", g.noise_floor_rmse),
@@ -161,7 +161,7 @@ fn residuals(result: &Diagnosis, table: &Table, forecasts: &[Forecast]) -> miett
         (d * (table.lateral[i] - f.recalibrated) / sd, d * (table.lateral[i] - f.corrected) / sd)
     };
     let z: Vec<(f64, f64)> = forecasts.iter().enumerate().map(z).collect();
-    let limit = z.iter().fold(4.0f64, |a, (b, _)| a.max(b.abs())).min(40.0);
+    let limit = 1.1 * z.iter().fold(4.0f64, |a, (b, _)| a.max(b.abs())).min(40.0);
     let mut figures = String::new();
     for c in covariate::COVARIATES {
         let all: Option<Vec<f64>> = table.passes.iter().map(|p| c.of(p).map(|v| c.shown.0 * v)).collect();

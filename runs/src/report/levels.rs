@@ -9,6 +9,8 @@ pub const FREQUENCY: f64 = 0.01;
 pub const SPEED: f64 = 0.03;
 /// See [`FREQUENCY`].
 pub const FORCE: f64 = 0.10;
+/// See [`FREQUENCY`]; the pressure of the air.
+pub const PRESSURE: f64 = 0.02;
 
 /// The levels in some values, rising.
 pub struct Levels(Vec<Vec<f64>>);

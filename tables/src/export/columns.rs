@@ -102,7 +102,7 @@ pub fn of(passes: &[MeasuredPass]) -> Table {
         compared("mu_relative_predicted_sd", "standard uncertainty of the predicted mu'", &|c| {
             Some(c.predicted_sd)
         }),
-        compared("residual_z", "measured less predicted, in standard deviations", &|c| Some(c.z)),
+        compared("residual_z", "friction less that expected after the passes before, in sd", &|c| Some(c.z)),
         compared("log_evidence", "ln of the evidence against the model so far", &|c| Some(c.log_evidence)),
         numbers("psi_eq17", "Psi of Eq. 17 at the measured condition", &|p| p.psi_eq17),
     ]);

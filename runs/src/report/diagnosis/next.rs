@@ -2,13 +2,10 @@
 
 use crate::human::{number, titled};
 use crate::report::html::{column, escape, numeric, table};
-use diagnosis::next::{Experiment, words};
+use diagnosis::next::{Experiment, odds, words};
 use diagnosis::verdict::Diagnosis;
 use models::condition::Condition;
 use models::covariate::{self, Covariate};
-
-/// Nats from which odds are no longer distinguished: a million to one.
-const BEYOND: f64 = 13.8;
 
 /// The section.
 pub fn section(result: &Diagnosis) -> String {
@@ -22,11 +19,7 @@ pub fn section(result: &Diagnosis) -> String {
 
 fn worth(e: &Experiment) -> String {
     let [a, b] = e.separates.each_ref().map(|name| words(name));
-    if e.expected_nats > BEYOND {
-        format!("If {a} is true, odds of more than a million to one against {b} are expected.")
-    } else {
-        format!("If {a} is true, odds of {} to 1 against {b} are expected.", number(e.expected_nats.exp()))
-    }
+    format!("If {a} is true, {} against {b} are expected.", odds(e.expected_nats))
 }
 
 fn one(e: &Experiment) -> String {
@@ -57,4 +50,25 @@ fn as_address(text: &str) -> String {
     let plain = |b: u8| b.is_ascii_alphanumeric() || b"-_.~".contains(&b);
     let byte = |b: u8| if plain(b) { char::from(b).to_string() } else { format!("%{b:02X}") };
     format!("data:application/toml;charset=utf-8,{}", text.bytes().map(byte).collect::<String>())
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// The page had 49840 to 1 where the terminal had 50000 to 1.
+    #[test]
+    fn odds_are_those_of_the_terminal() {
+        let separates = ["squeeze_film", "normal_offset"].map(String::from);
+        let of = |expected_nats: f64| {
+            worth(&Experiment {
+                conditions: Vec::new(),
+                separates: separates.clone(),
+                expected_nats,
+                text: String::new(),
+            })
+        };
+        assert!(of(49_840_f64.ln()).contains(", odds of 50000 to 1 against"), "{}", of(49_840_f64.ln()));
+        assert!(of(125.0).contains(", odds above 10^6 against"), "{}", of(125.0));
+    }
 }

@@ -2,6 +2,7 @@
 
 use crate::human::{settings, titled};
 use crate::report::html::note;
+use crate::report::levels::{FORCE, FREQUENCY, Levels, PRESSURE, SPEED};
 use crate::report::plots::verdict::{Seen, overlay, parity};
 use crate::report::plots::{Span, mu_axis};
 use diagnosis::data::Table;
@@ -9,13 +10,20 @@ use diagnosis::predict::Forecast;
 use diagnosis::verdict::Diagnosis;
 use models::condition::Condition;
 use models::covariate::{self, Covariate};
-use std::collections::BTreeMap;
 
 /// Panels that stand side by side.
 const PANELS: usize = 4;
-/// Share of the passes with vibration that must lie in the panels: below it curves at one base would show too little.
+/// Share of the passes with vibration at one pressure that the panels must hold: fewer show too little.
 const COVERED: f64 = 0.4;
 const PLACES: u32 = 60;
+/// The abscissa, what may part the panels, the air; and as how large a share values of one level differ.
+static SETTINGS: [(&Covariate, f64); 5] = [
+    (&covariate::AMPLITUDE, 0.02),
+    (&covariate::SPEED, SPEED),
+    (&covariate::FREQUENCY, FREQUENCY),
+    (&covariate::NORMAL_FORCE, FORCE),
+    (&covariate::AMBIENT_PRESSURE, PRESSURE),
+];
 
 /// The table as the figures need it: `mu'` of every pass, measured and under both models, and who is suspect.
 pub struct Overlay<'a> {
@@ -71,25 +79,23 @@ impl<'a> Overlay<'a> {
         Ok(parity(&points)? + &text)
     }
 
-    /// Panels by the setting that varies most besides the amplitude, at the levels of the others that are most common.
+    /// Panels by the setting that varies most besides the amplitude, at the commonest levels of the others.
     fn panels(&self) -> miette::Result<Option<String>> {
-        let driven: Vec<usize> =
+        let all: Vec<usize> =
             (0..self.table.len()).filter(|&i| self.table.passes[i].amplitude.metres() > 0.0).collect();
-        let abscissa = &covariate::AMPLITUDE;
-        if levels(self.table, &driven, abscissa).len() < 3 {
+        let [amplitude, others @ .., pressure] = &SETTINGS;
+        let driven = commonest(self.levels(&all, pressure));
+        if self.levels(&driven, amplitude).len() < 3 {
             return Ok(None);
         }
-        let others = [&covariate::SPEED, &covariate::FREQUENCY, &covariate::NORMAL_FORCE];
-        let Some(by) = others.iter().max_by_key(|c| levels(self.table, &driven, c).len()) else {
+        let Some(by) = others.iter().max_by_key(|c| self.levels(&driven, c).len()) else {
             return Ok(None);
         };
         let mut base = driven.clone();
-        for c in others.iter().filter(|c| c.name != by.name) {
-            let counts = levels(self.table, &base, c);
-            let Some((level, _)) = counts.iter().max_by_key(|(_, rows)| rows.len()) else { return Ok(None) };
-            base.retain(|i| neighbourhood(c, &self.table.passes[*i]) == Some(*level));
+        for c in others.iter().filter(|c| c.0.name != by.0.name) {
+            base = commonest(self.levels(&base, c));
         }
-        let mut panels: Vec<Vec<usize>> = levels(self.table, &base, by).into_values().collect();
+        let mut panels: Vec<Vec<usize>> = self.levels(&base, by);
         panels.sort_by_key(|rows| std::cmp::Reverse(rows.len()));
         panels.truncate(PANELS);
         panels.retain(|rows| rows.len() >= 3);
@@ -98,29 +104,34 @@ impl<'a> Overlay<'a> {
             return Ok(None);
         }
         panels.sort_by(|a, b| {
-            let of = |rows: &[usize]| by.of(&self.table.passes[rows[0]]).unwrap_or(0.0);
+            let of = |rows: &[usize]| by.0.of(&self.table.passes[rows[0]]).unwrap_or(0.0);
             of(a).total_cmp(&of(b))
         });
-        let all = panels.iter().flatten();
-        let axis = mu_axis(all.map(|&i| self.table.lateral[i] / self.full(&self.table.passes[i])));
-        let figures: miette::Result<Vec<String>> =
-            panels.iter().map(|rows| self.panel(rows, abscissa, &others, axis)).collect();
+        let seen = panels.iter().flatten();
+        let axis = mu_axis(seen.map(|&i| self.table.lateral[i] / self.full(&self.table.passes[i])));
+        let figures: miette::Result<Vec<String>> = panels.iter().map(|rows| self.panel(rows, axis)).collect();
+        let left = Some(all.len() - driven.len()).filter(|n| *n > 0);
+        let left = left.map_or_else(String::new, |n| format!("; {n} at other pressures are left out"));
         let text = note(&format!(
-            "{shown} of {} passes with vibration, those at the conditions that are most common. Discs with bars: measured, with the standard \
+            "{shown} of {} passes with vibration, those at the conditions that are most common{left}. Discs with bars: measured, with the standard \
              deviation of a pass. Dashes: the recalibrated baseline. Line and band: the verdict's model with twice its standard deviation. \
              Suspect passes are ringed. Both directions are shown alike.",
-            driven.len()
+            all.len()
         ));
         Ok(Some(format!("<div class=\"panels\">{}</div>{text}", figures?.concat())))
     }
 
-    fn panel(
-        &self,
-        rows: &[usize],
-        x: &Covariate,
-        others: &[&Covariate],
-        axis: [f64; 2],
-    ) -> miette::Result<String> {
+    /// Rows by the level of a setting, rising; those without a value share one.
+    fn levels(&self, rows: &[usize], (c, within): &(&Covariate, f64)) -> Vec<Vec<usize>> {
+        let of = |i: &usize| c.of(&self.table.passes[*i]).unwrap_or(0.0);
+        let levels = Levels::of(rows.iter().map(of), *within);
+        let mut all = vec![Vec::new(); levels.count()];
+        rows.iter().for_each(|i| all[levels.index(of(i))].push(*i));
+        all
+    }
+
+    fn panel(&self, rows: &[usize], axis: [f64; 2]) -> miette::Result<String> {
+        let x = &covariate::AMPLITUDE;
         let passes = &self.table.passes;
         let shown = |i: usize| x.shown.0 * x.of(&passes[i]).unwrap_or(0.0);
         let span = Span::from_zero(rows.iter().map(|&i| shown(i)));
@@ -146,7 +157,7 @@ impl<'a> Overlay<'a> {
         };
         let points: Vec<Seen> = rows.iter().map(point).collect();
         overlay(
-            &settings(others.iter().copied(), &typical),
+            &settings(SETTINGS[1..].iter().map(|c| c.0), &typical),
             (&titled(x), span),
             &points,
             &of(|f| f.recalibrated),
@@ -156,16 +167,6 @@ impl<'a> Overlay<'a> {
     }
 }
 
-fn neighbourhood(c: &Covariate, pass: &Condition) -> Option<i64> {
-    c.neighbourhood.zip(c.of(pass)).map(|(near, v)| near(v))
-}
-
-fn levels(table: &Table, rows: &[usize], c: &Covariate) -> BTreeMap<i64, Vec<usize>> {
-    let mut all = BTreeMap::<i64, Vec<usize>>::new();
-    for &i in rows {
-        if let Some(level) = neighbourhood(c, &table.passes[i]) {
-            all.entry(level).or_default().push(i);
-        }
-    }
-    all
+fn commonest(levels: Vec<Vec<usize>>) -> Vec<usize> {
+    levels.into_iter().max_by_key(Vec::len).unwrap_or_default()
 }

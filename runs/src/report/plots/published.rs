@@ -7,7 +7,7 @@ use super::{
 };
 use crate::human::{number, settings};
 use crate::report::html::escape;
-use crate::report::levels::{FORCE, FREQUENCY, Levels, SPEED};
+use crate::report::levels::{FORCE, FREQUENCY, Levels, PRESSURE, SPEED};
 use crate::report::published::Published;
 use crate::run_data::RunData;
 use crate::sequence::MeasuredPass;
@@ -47,12 +47,13 @@ impl Axis {
     }
 }
 
-static AXES: [Axis; 4] = [
+static AXES: [Axis; 5] = [
     Axis::new(AMPLITUDE, &covariate::AMPLITUDE, FREQUENCY, |p| p.amplitude_pp_m, [0.0, 5e-6]),
     Axis::new("frequency f, kHz", &covariate::FREQUENCY, FREQUENCY, |p| p.frequency_hz, [10e3, 100e3]),
     Axis::new("speed U, mm/s", &covariate::SPEED, SPEED, |p| p.speed_m_s, [5e-3, 0.1]),
-    // No panel: the load only says which passes belong together.
+    // No panels: load and pressure only say which passes belong together.
     Axis::new("load, N", &covariate::NORMAL_FORCE, FORCE, |p| p.normal_force_n, [0.1, 1.0]),
+    Axis::new("pressure, kPa", &covariate::AMBIENT_PRESSURE, PRESSURE, |_| None, [0.0, 1e7]),
 ];
 
 /// The three panels; their captions state what is not drawn.
