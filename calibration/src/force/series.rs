@@ -22,10 +22,7 @@ pub enum Branch {
 impl Branch {
     /// `1` for up, `-1` for down.
     pub fn sign(self) -> f64 {
-        match self {
-            Branch::Up => 1.0,
-            Branch::Down => -1.0,
-        }
+        if self == Branch::Up { 1.0 } else { -1.0 }
     }
 }
 

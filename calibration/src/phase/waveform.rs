@@ -138,10 +138,7 @@ fn spectrum(
     }
     let fundamental = parts[2][0].hypot(parts[2][1]);
     let doubt = (fit.covariance[(3, 3)] + fit.covariance[(4, 4)]).sqrt();
-    if fundamental < 10.0 * doubt {
-        return Err(PhaseError::NoMotion(name));
-    }
-    Ok(Spectrum { parts, fit })
+    if fundamental < 10.0 * doubt { Err(PhaseError::NoMotion(name)) } else { Ok(Spectrum { parts, fit }) }
 }
 
 /// Instant of the largest acceleration in periods of the drive; over two periods with subharmonics.

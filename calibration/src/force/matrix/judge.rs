@@ -28,10 +28,7 @@ pub(super) fn refuse_unfit(readings: &[LoadReading], options: &Options) -> Resul
         }
     }
     let zeros = readings.iter().filter(|r| r.axis.is_none()).count();
-    if zeros < 3 {
-        return Err(ForceError::TooFewZeros { found: zeros });
-    }
-    plateau(readings)
+    if zeros < 3 { Err(ForceError::TooFewZeros { found: zeros }) } else { plateau(readings) }
 }
 
 /// A converter that stands still while the load still grows, or that repeats its extreme value to the last
