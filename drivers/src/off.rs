@@ -51,10 +51,7 @@ pub fn switch_off(session: &mut Session, way: &mut dyn OffWay) -> Result<(), End
 
 /// The end of a conversation whose thread is to stop: off, read back.
 pub fn at_the_end(session: &mut Session, way: &mut dyn OffWay) -> Ended {
-    match switch_off(session, way) {
-        Ok(()) => Ended::Stopped,
-        Err(ended) => ended,
-    }
+    switch_off(session, way).err().unwrap_or(Ended::Stopped)
 }
 
 /// The start of a conversation after a lost one: an owed 'off' leaves before any request.

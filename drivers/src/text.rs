@@ -148,7 +148,8 @@ impl Talk {
         if !session.endpoint.profile().description.init.is_empty() {
             self.initialise(session)?;
         }
-        let parted = self.transport.is_parted();
+        // Each datagram is whole.
+        let parted = matches!(self.transport, Transport::Udp(..));
         super::stream::listen(session, stream, parted, &mut |buffer, deadline| {
             self.transport.read(buffer, deadline)
         })?;

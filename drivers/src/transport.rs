@@ -86,11 +86,6 @@ pub enum Transport {
 }
 
 impl Transport {
-    /// Whether what comes is parted already, each part whole.
-    pub fn is_parted(&self) -> bool {
-        matches!(self, Self::Udp(..))
-    }
-
     /// Reads what comes until `deadline`; zero bytes mean that it passed.
     ///
     /// # Errors
