@@ -40,10 +40,7 @@ pub fn markdown(profile: &Profile) -> String {
     let _ = writeln!(
         page,
         "\nTime of a sample: {}, {} ms late, \u{b1} {} ms. Test vectors: {}.",
-        match d.time.stamp {
-            Stamp::Device => "by the instrument's clock",
-            Stamp::Arrival => "when the answer arrived",
-        },
+        if d.time.stamp == Stamp::Device { "by the instrument's clock" } else { "when the answer arrived" },
         d.time.latency_ms,
         d.time.jitter_ms,
         d.vector.len()

@@ -169,10 +169,7 @@ impl Check {
     /// Bytes that the check takes.
     #[must_use]
     pub fn length(self) -> usize {
-        match self {
-            Self::Crc(cyclic) => usize::from(cyclic.parts(None).0 / 8),
-            _ => 1,
-        }
+        if let Self::Crc(cyclic) = self { usize::from(cyclic.parts(None).0 / 8) } else { 1 }
     }
 
     /// The check of `body`, as the frame has it. `high_first`: its high byte comes first; left out, so

@@ -126,10 +126,7 @@ pub fn payload<'a>(request: &Request, answer: &'a [u8]) -> Result<&'a [u8], RtuE
     if body[1] != function {
         return Err(RtuError::Function { expected: function, found: body[1] });
     }
-    if answer.len() != request.answer_length {
-        return Err(RtuError::Mismatch);
-    }
-    Ok(&body[2..])
+    if answer.len() != request.answer_length { Err(RtuError::Mismatch) } else { Ok(&body[2..]) }
 }
 
 /// The registers of an answer to [`read()`], judged as by [`payload`], as bytes; bits come as registers of 0

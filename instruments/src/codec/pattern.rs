@@ -189,10 +189,7 @@ impl Pattern {
 
     /// What every such line begins with.
     pub fn head(&self) -> &str {
-        match self.0.first() {
-            Some(Part::Literal(text)) => text,
-            _ => "",
-        }
+        if let Some(Part::Literal(text)) = self.0.first() { text } else { "" }
     }
 
     /// Characters that a line has at the least.

@@ -403,7 +403,9 @@ impl Compiler<'_> {
             return Ok(Place::Dbc(before, part));
         }
         let text_answer = frame.text.is_some();
-        if text_answer && s.has_place() {
+        let placed = s.register.is_some() || s.address.is_some() || s.byte.is_some();
+        let typed = s.number.is_some() || s.bits.is_some() || s.byte_order != ByteOrder::default();
+        if text_answer && (placed || typed) {
             let has = "is in a line of text: it has no register, byte, type, byte order or bits";
             return Err(wrong(format!("signal `{name}` {has}")));
         }

@@ -65,14 +65,6 @@ pub struct Signal {
     pub text: String,
 }
 
-impl Signal {
-    /// Whether it states where in its frame it stands, or as what.
-    pub fn has_place(&self) -> bool {
-        let placed = self.register.is_some() || self.address.is_some() || self.byte.is_some();
-        placed || self.number.is_some() || self.bits.is_some() || self.byte_order != ByteOrder::default()
-    }
-}
-
 /// The way from an instrument's unit to SI.
 #[derive(Debug, Clone, PartialEq, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
