@@ -7,7 +7,7 @@
 mod quick;
 
 use crate::condition::{Condition, OutOfDomain};
-use crate::prediction::{FrictionModel, Prediction, Validity};
+use crate::prediction::{FrictionModel, Prediction};
 use crate::quantity::PeakToPeak;
 pub use quick::{MOST_EVALUATIONS, QuickAnswer, Reach, quick};
 
@@ -85,13 +85,6 @@ pub fn amplitude_for(
         amplitude_sd_m: early.zip(late).map(|(a, b)| 0.5 * (b - a).abs()),
         relative_drive_power: (w / 1e-6).powi(2),
     })
-}
-
-impl AmplitudeAnswer {
-    /// Whether the law was made for the condition.
-    pub fn is_valid(&self) -> bool {
-        self.prediction.validity == Validity::Inside
-    }
 }
 
 #[cfg(test)]

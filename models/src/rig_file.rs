@@ -27,16 +27,10 @@ pub enum CertificateKind {
     Sensor,
 }
 
+/// The name that files have.
 impl std::fmt::Display for CertificateKind {
     fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
-        f.write_str(match self {
-            CertificateKind::Force => "force",
-            CertificateKind::Amplitude => "amplitude",
-            CertificateKind::Latency => "latency",
-            CertificateKind::Phase => "phase",
-            CertificateKind::Finger => "finger",
-            CertificateKind::Sensor => "sensor",
-        })
+        self.serialize(f)
     }
 }
 

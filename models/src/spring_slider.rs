@@ -211,6 +211,23 @@ impl Cycle {
         let lateral = 0.5 * (at(1.0, 1.0 + sd) - at(1.0, 1.0 - sd));
         normal.hypot(lateral)
     }
+
+    /// The forces over one period in `n` steps from touch-down, as in Figs. 8 and 10.
+    pub fn waveform(&self, n: usize) -> Vec<Instant> {
+        let groups = self.groups;
+        if !groups.compression_ratio.is_finite() {
+            let at = |i| i as f64 / n as f64;
+            let still =
+                |i| Instant { time_over_period: at(i), reaction_over_normal: 1.0, lateral_over_coulomb: 1.0 };
+            return (0..n).map(still).collect();
+        }
+        let (start, _) = groups.stretch.steady();
+        groups.stretch.sample(start, n, |turn, reaction, lateral| Instant {
+            time_over_period: turn,
+            reaction_over_normal: reaction / groups.compression_ratio,
+            lateral_over_coulomb: lateral / groups.compression_ratio,
+        })
+    }
 }
 
 /// Without vibration: Coulomb friction.
@@ -237,25 +254,6 @@ pub struct Instant {
     pub reaction_over_normal: f64,
     /// Lateral force in units of `mu_0` times the mean normal force.
     pub lateral_over_coulomb: f64,
-}
-
-impl Cycle {
-    /// The forces over one period in `n` steps from touch-down, as in Figs. 8 and 10.
-    pub fn waveform(&self, n: usize) -> Vec<Instant> {
-        let groups = self.groups;
-        if !groups.compression_ratio.is_finite() {
-            let at = |i| i as f64 / n as f64;
-            let still =
-                |i| Instant { time_over_period: at(i), reaction_over_normal: 1.0, lateral_over_coulomb: 1.0 };
-            return (0..n).map(still).collect();
-        }
-        let (start, _) = groups.stretch.steady();
-        groups.stretch.sample(start, n, |turn, reaction, lateral| Instant {
-            time_over_period: turn,
-            reaction_over_normal: reaction / groups.compression_ratio,
-            lateral_over_coulomb: lateral / groups.compression_ratio,
-        })
-    }
 }
 
 /// Mean relative friction of each of the first `cycles` periods after the slider was last unstretched (Fig. 13).

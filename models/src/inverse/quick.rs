@@ -114,10 +114,6 @@ impl Search {
             0.5 * (self.low.0 + upper)
         }
     }
-
-    fn is_narrow(&self) -> bool {
-        self.high.is_some_and(|high| high.0 - self.low.0 < NARROW_M)
-    }
 }
 
 /// The amplitude up to `largest` at which `law` gives `wanted` at a condition. `last` is the answer of the
@@ -179,7 +175,7 @@ pub fn quick(
     let mut beyond = false;
     while evaluations < MOST_EVALUATIONS && (mu - wanted).abs() > CLOSE {
         let mut to = search.next(w, mu, largest);
-        if search.is_narrow() {
+        if search.high.is_some_and(|high| high.0 - search.low.0 < NARROW_M) {
             break;
         }
         if w == largest && mu > wanted {

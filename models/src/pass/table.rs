@@ -87,12 +87,6 @@ const NUMBERS: [(&str, [f64; 2], &str); 4] = [
     ("phase_shift_deg", [-3600.0, 3600.0], "an angle in degrees, at most ten turns"),
 ];
 
-/// Whether a table may do without the column: one without the place has it nowhere, and a plate that stands
-/// still has no frequency.
-fn may_lack(c: &Covariate) -> bool {
-    c.name == covariate::POSITION.name || c.name == covariate::FREQUENCY.name
-}
-
 /// A header, and where each of its columns stands.
 struct Columns(csv::StringRecord);
 
@@ -100,7 +94,9 @@ impl Columns {
     /// Takes a header in which every column that a table must have stands, and none twice.
     fn of(header: csv::StringRecord) -> Result<Self, TableError> {
         let columns = Columns(header);
-        let required = covariate::REQUIRED.iter().filter(|c| !may_lack(c)).map(|c| c.name);
+        // One without the place has it nowhere, and a plate that stands still has no frequency.
+        let may_lack = [covariate::POSITION.name, covariate::FREQUENCY.name];
+        let required = covariate::REQUIRED.iter().map(|c| c.name).filter(|name| !may_lack.contains(name));
         let needed = std::iter::once("point").chain(required);
         let missing: Vec<_> = needed.filter(|name| columns.place(name).is_none()).collect();
         if !missing.is_empty() {
@@ -109,12 +105,9 @@ impl Columns {
         let optional = covariate::OPTIONAL.iter().map(|c| c.name);
         let known =
             ["point", "samples", "replicate", "run", "session"].into_iter().chain(NUMBERS.map(|n| n.0));
-        for name in known.chain(covariate::REQUIRED.iter().map(|c| c.name)).chain(optional) {
-            if columns.0.iter().filter(|h| h.trim() == name).count() > 1 {
-                return Err(TableError::DoubleColumn(name.to_string()));
-            }
-        }
-        Ok(columns)
+        let mut all = known.chain(covariate::REQUIRED.iter().map(|c| c.name)).chain(optional);
+        let twice = all.find(|name| columns.0.iter().filter(|h| h.trim() == *name).count() > 1);
+        twice.map_or(Ok(columns), |name| Err(TableError::DoubleColumn(name.to_string())))
     }
 
     fn place(&self, name: &str) -> Option<usize> {

@@ -5,6 +5,7 @@ use super::refused;
 use crate::verbs::prelude::*;
 use clap::Args;
 use models::inverse;
+use models::prediction::Validity;
 use models::quantity::PeakToPeak;
 use models::surrogate::Surrogate;
 use runs::human::{number, quantity, to_its_uncertainty};
@@ -71,7 +72,7 @@ pub fn run(args: &AmplitudeForArgs, json: bool) -> miette::Result<ExitCode> {
             number(wanted),
             quantity(answer.prediction.lateral_force_n, "N"),
             number(answer.relative_drive_power),
-            if answer.is_valid() {
+            if answer.prediction.validity == Validity::Inside {
                 "inside the fitted range"
             } else {
                 "OUTSIDE the fitted range: an extrapolation"

@@ -86,7 +86,8 @@ pub fn surface_compliance(mesh: &Mesh, held: usize) -> Result<Vec<Vec<f64>>, Rid
     let band = 4 * columns + 1;
     let n = 2 * columns * rows;
     let mut matrix = Banded::zeros(n, band.min(n - 1));
-    let rest = rested(mesh);
+    let mut rest = Body::new(mesh.clone(), Strain::Small);
+    rest.scale_bulk_viscosity(0.0);
     // Nodes 4 columns and 3 rows apart share no element: one step of the kernel reads all their columns.
     let around = |i: usize, by: isize| -> Option<usize> {
         let k = i as isize + by;
@@ -132,12 +133,6 @@ pub fn surface_compliance(mesh: &Mesh, held: usize) -> Result<Vec<Vec<f64>>, Rid
         right
     });
     Ok(solved.collect())
-}
-
-fn rested(mesh: &Mesh) -> Body {
-    let mut body = Body::new(mesh.clone(), Strain::Small);
-    body.scale_bulk_viscosity(0.0);
-    body
 }
 
 /// Force against a displacement in m of each node: one step of the kernel of one second from rest takes it from the velocities.
