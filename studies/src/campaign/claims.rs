@@ -66,10 +66,7 @@ pub fn trend([low, high]: [f64; 2], margin: f64) -> Option<Trend> {
     if high < -margin {
         return Some(Trend::Falls);
     }
-    if low > margin {
-        return Some(Trend::Rises);
-    }
-    (low > -margin && high < margin).then_some(Trend::Same)
+    if low > margin { Some(Trend::Rises) } else { (low > -margin && high < margin).then_some(Trend::Same) }
 }
 
 impl Claim {

@@ -24,6 +24,10 @@ pub fn page(file: &CampaignFile, made: &[Measured]) -> miette::Result<(String, V
     let title = escape(&file.name);
     let mut html = String::new();
     let w = &mut html;
+    let cell_words = |cell: &runs::campaign::Cell| {
+        let more = cell.tip.iter().chain(Some(&cell.condition).filter(|text| !text.is_empty()));
+        format!("{} ({}{})", cell.name, cell.setup, more.map(|text| format!(", {text}")).collect::<String>())
+    };
     let facts = [
         ("plan", file.plan.clone()),
         ("cells", file.cell.iter().map(cell_words).collect::<Vec<_>>().join("; ")),
@@ -97,12 +101,6 @@ fn methods(file: &CampaignFile, made: &[Measured]) -> String {
         number(file.margin),
         env!("CARGO_PKG_VERSION")
     )
-}
-
-fn cell_words(cell: &runs::campaign::Cell) -> String {
-    let tip = cell.tip.as_deref().map(|tip| format!(", {tip}")).unwrap_or_default();
-    let condition = if cell.condition.is_empty() { String::new() } else { format!(", {}", cell.condition) };
-    format!("{} ({}{tip}{condition})", cell.name, cell.setup)
 }
 
 fn answers(claims: &[Claim]) -> String {

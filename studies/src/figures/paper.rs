@@ -54,7 +54,9 @@ pub fn write(name: &str, charts: &[Chart], out: &Path) -> miette::Result<()> {
     let columns = charts.len().min(2);
     let rows = charts.len().div_ceil(columns.max(1));
     let width = COLUMNS_MM[columns.saturating_sub(1)];
-    let legend = charts.iter().map(legend_lines).max().unwrap_or(0) * LINE;
+    // Entries of a legend stand in two columns.
+    let lines = |chart: &Chart| (chart.series.len() + chart.stated.len()).div_ceil(2) as i32;
+    let legend = charts.iter().map(lines).max().unwrap_or(0) * LINE;
     let size = (units(width) as u32, (rows as i32 * (units(PANEL_MM) + legend)) as u32);
     let mut svg = String::new();
     draw(SVGBackend::with_string(&mut svg, size), charts, (rows, columns), legend)?;
@@ -82,11 +84,6 @@ where
         draw_panel(panel, chart, letter, legend).map_err(|why| miette!("{}: {why}", chart.name))?;
     }
     area.present().map_err(|why| miette!("{why}"))
-}
-
-/// Entries of a legend stand in two columns.
-fn legend_lines(chart: &Chart) -> i32 {
-    (chart.series.len() + chart.stated.len()).div_ceil(2) as i32
 }
 
 /// Over all that is drawn, with a margin; a ratio begins at zero.

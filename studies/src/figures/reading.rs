@@ -12,10 +12,7 @@ pub fn parser() -> impl TypedValueParser<Value = Reading> {
 
 /// A file's name under a reading.
 pub fn file(reading: Reading, name: &str) -> String {
-    match reading {
-        Reading::PeakToPeak => name.into(),
-        Reading::SineAmplitude => format!("{name}_sine_amplitude"),
-    }
+    if reading == Reading::PeakToPeak { name.into() } else { format!("{name}_sine_amplitude") }
 }
 
 /// The column that holds w, in um.

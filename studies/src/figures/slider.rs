@@ -123,11 +123,8 @@ pub fn slow_recovery(reading: Reading) -> miette::Result<Reproduced> {
 pub fn steady_recovery(reading: Reading) -> miette::Result<Reproduced> {
     let (mut series, mut at_five) = (Vec::new(), Vec::new());
     for mm_s in [1.5, 3.0, 5.0, 8.0, 15.0] {
-        let mut points = Vec::new();
-        for w in amplitudes_um(50, 5.0) {
-            let cycle = solve(reading, w * 1e-6, 0.5, &slow(Some(mm_s * 1e-3)))?;
-            points.push((w, cycle.mu_relative));
-        }
+        let point = |w| Ok((w, solve(reading, w * 1e-6, 0.5, &slow(Some(mm_s * 1e-3)))?.mu_relative));
+        let points = amplitudes_um(50, 5.0).into_iter().map(point).collect::<miette::Result<Vec<_>>>()?;
         at_five.push(format!("{mm_s}: {:.3}", points.last().map_or(f64::NAN, |p| p.1)));
         series.push(Series::line(format!("{mm_s} mm/s"), points));
     }

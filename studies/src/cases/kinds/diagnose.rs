@@ -58,10 +58,8 @@ pub struct Settings {
 
 fn prepare(header: &Header, folder: &Path) -> miette::Result<super::Make> {
     let settings: Settings = super::settings(header)?;
-    for name in &settings.without {
-        if effects::by_name(name).is_none() {
-            miette::bail!("without {name}: no such effect; `muprime model effects` lists them");
-        }
+    if let Some(name) = settings.without.iter().find(|name| effects::by_name(name).is_none()) {
+        miette::bail!("without {name}: no such effect; `muprime model effects` lists them");
     }
     let files: Vec<PathBuf> = settings.effect.iter().map(|file| folder.join(file)).collect();
     let own = tables::law::own_effects(&files)?;

@@ -55,10 +55,8 @@ pub fn distance(set: &Set) -> Option<f64> {
 /// Median distance and number of sets of each cause.
 pub fn by_cause(all: &[Scored]) -> BTreeMap<String, (f64, usize)> {
     let mut lists: BTreeMap<String, Vec<f64>> = BTreeMap::new();
-    for s in all {
-        if let Some(d) = s.distance {
-            lists.entry(s.truth.join("+")).or_default().push(d);
-        }
+    for (s, d) in all.iter().filter_map(|s| Some((s, s.distance?))) {
+        lists.entry(s.truth.join("+")).or_default().push(d);
     }
     lists.into_iter().map(|(name, mut d)| (name, (super::median(&mut d), d.len()))).collect()
 }
