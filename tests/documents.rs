@@ -1,5 +1,5 @@
 //! What is generated from the profiles: the schema for editors and a page for each instrument.
-//! `MUPRIME_UPDATE=1 cargo test --release -p muprime-tests --test documents` writes them anew.
+//! `MUPRIME_UPDATE=1 cargo test --release -p muprime-tests --test documents` writes them again.
 
 use drivers::{bundled, profile};
 use tests::file;

@@ -117,8 +117,8 @@ pub fn is_reversed<'a>(passes: impl Iterator<Item = &'a Pass> + Clone) -> bool {
 }
 
 /// `mu_0 = sum(direction L F) / sum(F^2)` over the passes without vibration; `None` without such passes.
-pub fn coulomb_coefficient(passes: &[Pass]) -> Option<f64> {
-    let still = passes.iter().filter(|p| p.amplitude == PeakToPeak::ZERO);
+pub fn coulomb_coefficient<'a>(passes: impl IntoIterator<Item = &'a Pass>) -> Option<f64> {
+    let still = passes.into_iter().filter(|p| p.amplitude == PeakToPeak::ZERO);
     let forces = still.filter_map(|p| Some((p.friction_force_n()?, p.normal_force_n)));
     let (top, bottom) = forces.fold((0.0, 0.0), |(top, bottom), (l, f)| (top + l * f, bottom + f * f));
     (bottom > 0.0).then(|| top / bottom)

@@ -122,7 +122,6 @@ impl RunEntry {
         let notes = identity.as_ref().map(|one| one.notes.clone()).unwrap_or_default();
         let planned = identity.as_ref().map_or(0, |one| one.planned);
         let passes = passes_in(run).unwrap_or_default();
-        let plain: Vec<_> = passes.iter().map(|p| p.pass.clone()).collect();
         let annotations = Annotations::read(run).unwrap_or_default();
         let summary = std::fs::read(run.join(run_dir::SUMMARY)).ok();
         let ending = summary.and_then(|text| serde_json::from_slice(&text).ok()).unwrap_or_else(|| {
@@ -143,7 +142,7 @@ impl RunEntry {
             tip: fact("fingertip"),
             model,
             seed: identity.map(|one| one.seed),
-            mu0: models::pass::coulomb_coefficient(&plain),
+            mu0: models::pass::coulomb_coefficient(passes.iter().map(|p| &p.pass)),
             verdict: verdict_in(run),
             tags: annotations.tags,
             note: annotations.note,

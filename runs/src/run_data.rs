@@ -9,7 +9,7 @@ use crate::run_dir::{differences, missing_records, of_record, open_record, passe
 use crate::sequence::{MeasuredPass, Outcome};
 use crate::session::Summary;
 use models::finger::Finger;
-use models::pass::{Pass, coulomb_coefficient};
+use models::pass::coulomb_coefficient;
 use realtime::recorder::{self, Entry};
 use std::collections::BTreeMap;
 use std::path::Path;
@@ -94,8 +94,7 @@ pub fn read(folder: &Path) -> miette::Result<RunData> {
 /// Takes the run's own `mu_0` for the measured `mu'` of every pass that has one, and returns it. The standard
 /// uncertainty keeps its share of the value: that of `mu_0` is the larger one of the time of the pass.
 fn restated(passes: &mut [MeasuredPass]) -> Option<f64> {
-    let plain: Vec<Pass> = passes.iter().map(|p| p.pass.clone()).collect();
-    let mu0 = coulomb_coefficient(&plain).filter(|mu0| *mu0 > 0.0)?;
+    let mu0 = coulomb_coefficient(passes.iter().map(|p| &p.pass)).filter(|mu0| *mu0 > 0.0)?;
     for MeasuredPass { pass, comparison, .. } in passes {
         let Some((friction, found)) = pass.friction_force_n().zip(comparison.as_mut()) else { continue };
         let Some(before) = found.mu_relative else { continue };

@@ -42,7 +42,8 @@ pub struct Subject {
 
 /// The refusal of passes that cannot be diagnosed, with a remedy of its own where a new table would not help.
 pub fn unfit(why: DataError) -> miette::Report {
-    let help = "a plan with more settings or replicates gives more passes; `muprime run` with the same --out continues a run";
+    let help = "a plan with more settings or replicates gives more passes; `muprime run` with the same --out \
+                continues a run";
     match why {
         DataError::TooFew(_) => miette::miette!(help = help, "{why}"),
         why => miette::Report::msg(why),

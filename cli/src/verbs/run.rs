@@ -47,8 +47,11 @@ pub struct Args {
     /// Folder of the run; an unfinished run there is resumed [default: a new one in ./runs]
     #[arg(long)]
     out: Option<PathBuf>,
-    #[arg(long, value_name = "LAW", help = format!("The law to compare with: {}, or a file: a corrected model of 'muprime \
-        diagnose --save-model', a law table, a ridge table, a surrogate.json [default: spring-slider]", BuiltIn::names()))]
+    #[arg(long, value_name = "LAW", help = format!(
+        "The law to compare with: {}, or a file: a corrected model of 'muprime diagnose --save-model', a law \
+         table, a ridge table, a surrogate.json [default: spring-slider]",
+        BuiltIn::names()
+    ))]
     model: Option<PathBuf>,
     /// Seed of the order (and of the virtual rig) [default: the plan's]
     #[arg(long)]

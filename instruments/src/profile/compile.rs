@@ -398,7 +398,7 @@ impl Compiler<'_> {
             let part = s.bits.map_or(Some(*signal), |bits| signal.part(bits));
             let part = part.ok_or_else(|| {
                 let why = format!("`bits` of signal `{name}`: `{path}` has not these bits, or is scaled");
-                wrong(why).with_help("only a whole number without factor and offset is parted")
+                wrong(why).with_help("`bits` takes a part of a whole number without factor and offset")
             })?;
             return Ok(Place::Dbc(before, part));
         }

@@ -66,7 +66,7 @@ pub(super) fn read_run(folder: &Path) -> miette::Result<RunData> {
     if records_in(folder)?.is_empty() {
         let stated: toml::Table = crate::input::text_of(&folder.join("run.toml"))
             .and_then(|text| toml::from_str(&text).into_diagnostic())
-            .wrap_err("without a record, run.toml must have seed, setup and plan of the run; keep it beside points.csv")?;
+            .wrap_err("without a record, run.toml must have the run's seed, setup and plan: keep it too")?;
         let words = |value: toml::Value| value.as_str().map_or_else(|| value.to_string(), String::from);
         let of_record = |name: String| if name == "model" { "model_identity".into() } else { name };
         run.facts = stated.into_iter().map(|(name, value)| (of_record(name), words(value))).collect();

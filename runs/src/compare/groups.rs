@@ -166,7 +166,8 @@ impl Grouped {
             return "cannot tell: no group has a condition in common with the first".into();
         }
         format!(
-            "{apart} of {all} differences of mu' from '{}' have a 95 % interval without zero; chance alone would give about {:.0}",
+            "{apart} of {all} differences of mu' from '{}' have a 95 % interval without zero; chance alone would \
+             give about {:.0}",
             self.groups[0].name,
             0.05 * all as f64
         )

@@ -7,7 +7,7 @@
 use models::condition::Condition;
 use models::covariate::{self, Covariate};
 use models::finger::Finger;
-use models::pass::{Pass, coulomb_coefficient};
+use models::pass::coulomb_coefficient;
 use models::prediction::Regime;
 use models::quantity::PeakToPeak;
 use runs::campaign::Session;
@@ -57,8 +57,7 @@ pub struct Measured {
 impl Measured {
     /// The passes of a session.
     pub fn new(session: Session, kind: FingertipKind, finger: Finger, passes: &[MeasuredPass]) -> Self {
-        let bare: Vec<Pass> = passes.iter().map(|p| p.pass.clone()).collect();
-        let mu0 = coulomb_coefficient(&bare).filter(|mu0| *mu0 > 0.0);
+        let mu0 = coulomb_coefficient(passes.iter().map(|p| &p.pass)).filter(|mu0| *mu0 > 0.0);
         let driven = |p: &MeasuredPass| {
             let (mu0, friction) = (mu0?, p.pass.friction_force_n()?);
             (p.pass.amplitude > PeakToPeak::ZERO && p.pass.normal_force_n > 0.0).then(|| Driven {

@@ -54,7 +54,7 @@ pub fn write(name: &str, charts: &[Chart], out: &Path) -> miette::Result<()> {
     let columns = charts.len().min(2);
     let rows = charts.len().div_ceil(columns.max(1));
     let width = COLUMNS_MM[columns.saturating_sub(1)];
-    // Entries of a legend stand in two columns.
+    // A legend has two columns.
     let lines = |chart: &Chart| (chart.series.len() + chart.stated.len()).div_ceil(2) as i32;
     let legend = charts.iter().map(lines).max().unwrap_or(0) * LINE;
     let size = (units(width) as u32, (rows as i32 * (units(PANEL_MM) + legend)) as u32);

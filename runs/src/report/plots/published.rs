@@ -58,8 +58,7 @@ static AXES: [Axis; 5] = [
 
 /// The three panels; their captions state what is not drawn.
 pub fn panels(run: &RunData, all: &[Published]) -> miette::Result<String> {
-    let passes: Vec<_> = run.passes.iter().map(|p| p.pass.clone()).collect();
-    let mu0 = models::pass::coulomb_coefficient(&passes);
+    let mu0 = models::pass::coulomb_coefficient(run.passes.iter().map(|p| &p.pass));
     let compared = run.passes.iter().filter(|p| p.comparison.is_some_and(|c| c.mu_relative.is_some()));
     let driven: Vec<(&MeasuredPass, Condition)> = compared
         .filter(|p| p.pass.amplitude > PeakToPeak::ZERO)

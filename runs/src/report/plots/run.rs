@@ -57,8 +57,7 @@ pub fn mu_against_amplitude(run: &RunData) -> miette::Result<String> {
     let axis = mu_axis(marks().flat_map(|(_, mu, sd)| [mu - sd, mu + sd]));
     let widest = chosen.iter().map(|p| p.pass.amplitude.micrometres()).fold(1.0, f64::max) * 1.05;
     let model = SpringSlider::new(run.finger).map_err(wrong)?;
-    let mu0 =
-        models::pass::coulomb_coefficient(&run.passes.iter().map(|p| p.pass.clone()).collect::<Vec<_>>());
+    let mu0 = models::pass::coulomb_coefficient(run.passes.iter().map(|p| &p.pass));
     let alt = format!(
         "Relative friction against amplitude at {f} kHz: {} passes at {} speeds, measured and predicted.",
         chosen.len(),
