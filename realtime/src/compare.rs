@@ -126,7 +126,7 @@ impl Comparator {
         let noise = (self.noise.pass_relative_sd * expected).powi(2)
             + self.noise.force_sd_n.powi(2) * (1.0 + load_slope * load_slope)
             + form * form;
-        let gain = product(&self.covariance, &slope);
+        let gain = self.covariance.map(|row| dot(&row, &slope));
         let shared = dot(&slope, &gain);
         let variance = shared + noise;
         let innovation = friction_force_n - expected;
@@ -178,10 +178,6 @@ impl Comparator {
 
 fn dot(a: &[f64; 3], b: &[f64; 3]) -> f64 {
     a[0] * b[0] + a[1] * b[1] + a[2] * b[2]
-}
-
-fn product(m: &[[f64; 3]; 3], v: &[f64; 3]) -> [f64; 3] {
-    [dot(&m[0], v), dot(&m[1], v), dot(&m[2], v)]
 }
 
 #[cfg(test)]

@@ -35,16 +35,12 @@ pub fn replay(config: &Config, model: &dyn FrictionModel, rows: impl IntoIterato
         let out = cycle::step(config, model, &mut state, &row.inputs, row.now);
         let again = Row::of(row.cycle, row.now, &row.inputs, &out);
         found.cycles += 1;
-        if same(&again, &row) {
+        // Equal bit for bit, where `NaN` equals itself: as the record writes them.
+        if again == row || serde_json::to_string(&again).ok() == serde_json::to_string(&row).ok() {
             found.equal += 1;
         } else {
             found.first_difference = found.first_difference.or(Some(row.cycle));
         }
     }
     found
-}
-
-/// Equal bit for bit, where `NaN` equals itself: as the record writes them.
-fn same(a: &Row, b: &Row) -> bool {
-    a == b || serde_json::to_string(a).ok() == serde_json::to_string(b).ok()
 }

@@ -82,10 +82,8 @@ impl Integrity {
 
     /// The findings, one sentence each; empty if the record is complete.
     pub fn sentences(&self) -> Vec<String> {
-        let mut list = Vec::new();
-        for Place { from, to, why } in &self.places {
-            list.push(format!("bytes {from} to {to} are damaged: {why}"));
-        }
+        let damaged = |Place { from, to, why }: &Place| format!("bytes {from} to {to} are damaged: {why}");
+        let mut list: Vec<String> = self.places.iter().map(damaged).collect();
         let unlisted = self.damaged_places - self.places.len() as u64;
         if unlisted > 0 {
             list.push(format!("{unlisted} more stretches are damaged, {} bytes in all", self.damaged_bytes));

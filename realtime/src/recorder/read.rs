@@ -415,10 +415,7 @@ impl<R: Read + Seek> Reader<R> {
         if self.body != magic {
             return Err(Trouble::Bad("the file does not end as an MCAP file does".into()));
         }
-        if self.fill(1)? {
-            return Err(Trouble::Bad("something follows its end".into()));
-        }
-        Ok(Some(0))
+        if self.fill(1)? { Err(Trouble::Bad("something follows its end".into())) } else { Ok(Some(0)) }
     }
 }
 

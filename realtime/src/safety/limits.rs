@@ -332,7 +332,9 @@ impl Limits {
             ("late_in_a_row_max", f64::from(self.late_in_a_row_max), f64::from(HARD.late_in_a_row_max)),
         ];
         for (name, value, hard) in hard {
-            positive(name, value)?;
+            if !(value.is_finite() && value > 0.0) {
+                return Err(LimitError::Unusable { name, value, needed: "a finite number above zero" });
+            }
             if value > hard {
                 return Err(LimitError::AboveHard { name, value, hard });
             }
@@ -410,9 +412,4 @@ impl Timing {
         Range { low, high, why }.check("command_expiry", self.command_expiry.seconds())?;
         range::RING_S.check("plate_ring_time_s", self.ring_time.seconds())
     }
-}
-
-fn positive(name: &'static str, value: f64) -> Result<(), LimitError> {
-    let unusable = LimitError::Unusable { name, value, needed: "a finite number above zero" };
-    if value.is_finite() && value > 0.0 { Ok(()) } else { Err(unusable) }
 }

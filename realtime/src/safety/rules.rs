@@ -95,7 +95,7 @@ rules! {
     "SR-05" LateralOverforce [Newton] "Lateral force stays below its limit, either sign." => |c| overforce(c, &c.watch.lateral, c.limits.lateral_force_max_n, c.limits.timing.lateral.period);
     "SR-06" ForceRate [NewtonPerSecond] "Normal force does not change faster than its limit over two samples in a row." => |c| broken(c.watch.normal.fast_in_a_row >= 2, c.watch.normal.rate_n_s.abs(), c.limits.force_rate_max_n_s);
     "SR-07" OverAmplitude [Metre] "Measured amplitude stays below its limit." => |c| above(amplitude_pp_m(c), c.limits.amplitude_max.metres());
-    "SR-08" AmplitudeRunaway [Metre] "Measured amplitude stays within 30 % (and 0.3 \u{b5}m) of what was commanded, ring-down allowed." => runaway;
+    "SR-08" AmplitudeRunaway [Metre] "Measured amplitude stays within 30 % (and 0.3 \u{b5}m) of what was commanded, ring-down allowed." => |c| above(amplitude_pp_m(c), 1.3 * c.watch.ringing_pp_m + 0.3e-6);
     "SR-09" AmplitudeRate [MetrePerSecond] "Measured amplitude does not rise faster than its limit over two samples in a row." => |c| broken(c.watch.amplitude_fast_in_a_row >= 2, c.watch.amplitude_rate_m_s, c.limits.amplitude_rate_max_m_s);
     "SR-10" LateralInvalid [Count] "Three cycles without a valid lateral sample switch off." => |c| broken(c.watch.lateral.invalid_in_a_row >= 3, f64::from(c.watch.lateral.invalid_in_a_row), 3.0);
     "SR-11" NormalInvalid [Count] "Three cycles without a valid normal sample switch off." => |c| broken(c.watch.normal.invalid_in_a_row >= 3, f64::from(c.watch.normal.invalid_in_a_row), 3.0);
@@ -124,8 +124,8 @@ rules! {
     "SR-34" NormalLossy [Share] "At least a quarter of the normal samples that are due in a window come." => |c| lossy(c, c.watch.normal.share_came);
     "SR-37" SupplySwitch [Second] "A second switch-off channel that is fitted reads back its command." => supply_switch;
     "SR-38" Unguarded [Flag] "A human finger needs a second channel, an emergency stop, a dead-man device, and a watchdog of at most 1 s at the amplifier or at the second channel; an amplifier without such a watchdog needs a second channel." => unguarded;
-    "SR-39" ExposureDuty [Second] "With a human finger, no larger share of the last hour is vibrated than its limit." => exposure_duty;
-    "SR-40" ExposureDose [SquareMetrePerSecond] "With a human finger, the squared velocity summed over the last hour stays below its limit." => exposure_dose;
+    "SR-39" ExposureDuty [Second] "With a human finger, no larger share of the last hour is vibrated than its limit." => |c| above(last_hour(c).map(|(driven, _)| driven), 3600.0 * c.limits.exposure_duty_max);
+    "SR-40" ExposureDose [SquareMetrePerSecond] "With a human finger, the squared velocity summed over the last hour stays below its limit." => |c| above(last_hour(c).map(|(_, dose)| dose), c.limits.exposure_dose_max_m2_s);
     "SR-41" AmplitudeSaturated [Count] "An amplitude at the end of its range in two states in a row switches off." => |c| broken(c.watch.amplitude_saturated_in_a_row >= 2, f64::from(c.watch.amplitude_saturated_in_a_row), 2.0);
     "SR-42" AmplitudeFrozen [Count] "While the plate is driven, a measured amplitude that has noise does not repeat its raw value more often than that allows." => amplitude_frozen;
     "SR-43" LoadImplausible [Newton] "Normal force stays near the load that the stage is commanded to apply, and near zero when it is commanded to lift off." => load_plausible;
@@ -230,14 +230,6 @@ fn last_hour(c: &Context<'_>) -> Option<(f64, f64)> {
     })
 }
 
-fn exposure_duty(c: &Context<'_>) -> Option<(f64, f64)> {
-    above(last_hour(c).map(|(driven, _)| driven), 3600.0 * c.limits.exposure_duty_max)
-}
-
-fn exposure_dose(c: &Context<'_>) -> Option<(f64, f64)> {
-    above(last_hour(c).map(|(_, dose)| dose), c.limits.exposure_dose_max_m2_s)
-}
-
 fn supply_switch(c: &Context<'_>) -> Option<(f64, f64)> {
     let timing = &c.limits.timing.supply;
     let limit = timing.age_limit().seconds();
@@ -300,10 +292,6 @@ fn is_numeric(a: &AmplifierState) -> bool {
     a.amplitude.map_or(true, |r| r.value >= AMPLITUDE_NOISE_M && r.value.is_finite())
         && a.echoed_frequency_hz.is_finite()
         && a.echoed_amplitude.metres().is_finite()
-}
-
-fn runaway(c: &Context<'_>) -> Option<(f64, f64)> {
-    above(amplitude_pp_m(c), 1.3 * c.watch.ringing_pp_m + 0.3e-6)
 }
 
 fn stale(channel: &Channel, limit: Nanos, now: Nanos) -> Option<(f64, f64)> {
