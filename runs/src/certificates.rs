@@ -83,7 +83,11 @@ impl Certificates {
                 }
                 let calibration = ForceCalibration::compile(verified, file.temperature_c)
                     .map_err(|e| fail(e.to_string()))?;
-                all.force = Some((calibration, zero(file, &certificate)));
+                // The setup's zero, or the one that was found with the certificate: both are written down.
+                let none = Zero { counts: [0.0; 2], standard_uncertainty: [0.0; 2], time_s: 0.0 };
+                let found = Zero::of_certificate(&certificate).unwrap_or(none);
+                let zero = Zero { counts: file.zero_counts.unwrap_or(found.counts), ..found };
+                all.force = Some((calibration, zero));
                 if file.zero_counts.is_some() {
                     // The certificate speaks for its own zero, not for the one that the setup states.
                     (all.calibration.lateral_offset_sd_n, all.calibration.normal_offset_sd_n) = (None, None);
@@ -170,14 +174,6 @@ fn serial(file: &SetupFile, kind: CertificateKind) -> Result<Option<String>, Str
     known.map(|serials| Some(serials.join("+"))).ok_or_else(|| {
         format!("the setup must state the `serial` of the instrument that the {kind} certificate is for")
     })
-}
-
-/// The setup's stated zero, or the one that was found with the certificate. Neither is silent: the first
-/// stands in the setup, the second in the certificate.
-fn zero(file: &SetupFile, certificate: &Certificate) -> Zero {
-    let none = Zero { counts: [0.0; 2], standard_uncertainty: [0.0; 2], time_s: 0.0 };
-    let found = Zero::of_certificate(certificate).unwrap_or(none);
-    Zero { counts: file.zero_counts.unwrap_or(found.counts), ..found }
 }
 
 /// A force port around a force port: counts in, calibrated newtons out. No allocation, no lock.

@@ -45,14 +45,10 @@ pub fn fresh(path: &Path) -> io::Result<File> {
     }
 }
 
-/// The folder that holds a file or folder of that name.
-fn folder_of(path: &Path) -> &Path {
-    path.parent().filter(|p| !p.as_os_str().is_empty()).unwrap_or(Path::new("."))
-}
-
 /// Makes the names in the folder of `path` safe.
 pub fn sync_folder_of(path: &Path) -> io::Result<()> {
-    File::open(folder_of(path))?.sync_all()
+    let folder = path.parent().filter(|p| !p.as_os_str().is_empty()).unwrap_or(Path::new("."));
+    File::open(folder)?.sync_all()
 }
 
 /// Writes a file that a person named, whole or not at all: after a crash or a power cut either the old one is
@@ -112,9 +108,7 @@ pub fn make_folder(path: &Path) -> miette::Result<Vec<PathBuf>> {
     let mut made: Vec<PathBuf> = missing.map(Path::to_path_buf).collect();
     made.reverse();
     fs::create_dir_all(path).into_diagnostic().wrap_err_with(wrong)?;
-    for folder in &made {
-        sync_folder_of(folder).into_diagnostic().wrap_err_with(wrong)?;
-    }
+    made.iter().try_for_each(|folder| sync_folder_of(folder)).into_diagnostic().wrap_err_with(wrong)?;
     Ok(made)
 }
 

@@ -392,10 +392,7 @@ impl Job {
         update: &mut dyn FnMut(Update<'_>),
     ) -> miette::Result<Summary> {
         let begun = self.begin()?;
-        if begun.is_complete() {
-            return begun.finish(&self);
-        }
-        fast::run(self, begun, signals, update)
+        if begun.is_complete() { begun.finish(&self) } else { fast::run(self, begun, signals, update) }
     }
 
     /// The world of the virtual rig; an error says why it cannot be.

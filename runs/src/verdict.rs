@@ -79,15 +79,13 @@ pub fn plan(experiment: &diagnosis::next::Experiment) -> String {
     let mut text = format!(
         "# Written by muprime diagnose.\nname = \"next-experiment\"\nabout = {about}\nrandomise = false\n\n[base]\n"
     );
-    for (name, value) in covariate::planned().filter(|k| listed(k) && based(k)).filter_map(|k| of(base, k)) {
-        text.push_str(&format!("{name} = {value:e}\n"));
-    }
+    let common = covariate::planned().filter(|k| listed(k) && based(k)).filter_map(|k| of(base, k));
+    text.extend(common.map(|(name, value)| format!("{name} = {value:e}\n")));
     for (c, number) in conditions.iter().zip(1..) {
         let direction = i8::from(c.direction);
         text.push_str(&format!("\n[[series]]\nname = \"pass {number}\"\ndirections = [{direction}]\n"));
-        for (name, value) in covariate::planned().filter(listed).filter_map(|k| of(c, k)) {
-            text.push_str(&format!("{name} = [{value:e}]\n"));
-        }
+        let own = covariate::planned().filter(listed).filter_map(|k| of(c, k));
+        text.extend(own.map(|(name, value)| format!("{name} = [{value:e}]\n")));
     }
     text
 }
@@ -208,13 +206,9 @@ pub fn terminal(result: &Diagnosis) -> String {
     }
     if !r.not_testable.is_empty() {
         text.push_str("\nThis table cannot test\n");
-        for n in &r.not_testable {
-            text.push_str(&format!("  {}: {}\n", plain(&n.effect), n.because));
-        }
+        text.extend(r.not_testable.iter().map(|n| format!("  {}: {}\n", plain(&n.effect), n.because)));
     }
-    for remark in &r.remarks {
-        text.push_str(&format!("\n{remark}\n"));
-    }
+    text.extend(r.remarks.iter().map(|remark| format!("\n{remark}\n")));
     text
 }
 

@@ -110,10 +110,7 @@ pub fn certified(args: &Args) -> miette::Result<Issued> {
         frozen.push(equal.frozen_after(args.false_alarm));
         spectra.push(spectrum);
     }
-    let frozen_after = match frozen.as_slice() {
-        [Some(a), Some(b)] => Some((*a).max(*b)),
-        _ => None,
-    };
+    let frozen_after = if let [Some(a), Some(b)] = frozen.as_slice() { Some((*a).max(*b)) } else { None };
     remarks.push(match frozen_after {
         Some(n) => format!(
             "frozen-value rule: {n} equal samples in a row, at most {:.0e} false alarms a sample; in the setup: [limits] \

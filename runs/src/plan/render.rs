@@ -215,20 +215,17 @@ impl Plan {
         Ok(Some(gains))
     }
 
-    /// The stroke of the longest pass in m.
-    fn longest_m(&self) -> f64 {
-        let base = self.file.base.speed_m_s;
-        let speeds = |s: &Series| if s.speed_m_s.is_empty() { vec![base] } else { s.speed_m_s.clone() };
-        self.file.series.iter().flat_map(speeds).map(|u| self.stroke_m(u, 0)).fold(0.0, f64::max)
-    }
-
     /// The target of a plan that renders one.
     ///
     /// # Errors
     /// A file that cannot be used, or that does not cover the stroke of a pass.
     pub fn target(&self, mu0: f64, feedback: Option<Feedback>) -> miette::Result<Option<Target>> {
         let Some(render) = &self.file.render else { return Ok(None) };
-        let (middle, half) = (self.file.base.position_m, 0.5 * self.longest_m());
+        let base = self.file.base;
+        let speeds =
+            |s: &Series| if s.speed_m_s.is_empty() { vec![base.speed_m_s] } else { s.speed_m_s.clone() };
+        let strokes = self.file.series.iter().flat_map(speeds).map(|u| self.stroke_m(u, 0));
+        let (middle, half) = (base.position_m, 0.5 * strokes.fold(0.0, f64::max));
         let target = render.made(self, [middle - half, middle + half], mu0)?;
         let [low, high] = target.span_m();
         if low > middle - half + 1e-3 || high < middle + half - 1e-3 {

@@ -79,11 +79,6 @@ impl Step {
         }
     }
 
-    /// The answer of a virtual rig: the paper's moist skin by default.
-    pub fn usual_number(&self) -> Option<f64> {
-        self.number_name().map(|_| self.usual.unwrap_or(35.0))
-    }
-
     /// Name of the number that is typed in answer.
     pub fn number_name(&self) -> Option<&str> {
         self.number.as_deref().or((self.action == Action::MeasureMoisture).then_some(SKIN_MOISTURE))

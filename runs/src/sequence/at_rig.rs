@@ -391,7 +391,8 @@ impl Sequence {
     fn ask(&mut self, task: &Task, row: &Row, out: &mut Reaction) {
         let (usual, level) = match task {
             Task::Level(at, wanted) => (Some(*wanted), Some((*at, *wanted))),
-            Task::Step(step) => (step.usual_number(), None),
+            // What a virtual rig answers: the paper's moist skin by default.
+            Task::Step(step) => (Some(step.usual.unwrap_or(35.0)), None),
         };
         let types = self.at_rig.types(task).map(String::from);
         out.question = Some(Question { usual: usual.filter(|_| types.is_some()), level });

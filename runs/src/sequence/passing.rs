@@ -30,10 +30,7 @@ pub(super) struct Sums {
 impl Sequence {
     /// Compares the amplifier's temperature with the certificates; what is new becomes an event.
     pub(super) fn check_temperature(&mut self, row: &Row, out: &mut Reaction) {
-        let temperature_c = match &row.inputs.seen.amplifier {
-            Ok(amplifier) => amplifier.temperature_c,
-            Err(reason) => Err(*reason),
-        };
+        let temperature_c = row.inputs.seen.amplifier.and_then(|amplifier| amplifier.temperature_c);
         let flags: Vec<TemperatureFlag> =
             self.temperature_ranges.iter().filter_map(|range| range.flag(&temperature_c)).collect();
         let before = std::mem::take(&mut self.temperature_flags);

@@ -232,10 +232,8 @@ fn share_lines(all: &[(&'static str, &InstrumentSetup)]) -> Result<(), Problem> 
         Some((path, over_rtu || kind == LinkKind::ModbusRtu))
     };
     let mut lines: BTreeMap<PathBuf, Vec<(&'static str, &InstrumentSetup, bool)>> = BTreeMap::new();
-    for &(table, instrument) in all {
-        if let Some((path, rtu)) = line(instrument) {
-            lines.entry(path).or_default().push((table, instrument, rtu));
-        }
+    for ((path, rtu), (table, instrument)) in all.iter().filter_map(|one| Some((line(one.1)?, *one))) {
+        lines.entry(path).or_default().push((table, instrument, rtu));
     }
     for (path, shared) in lines.into_iter().filter(|(_, shared)| shared.len() > 1) {
         let mut share = 0.0;
@@ -345,16 +343,10 @@ impl Setup {
         }
         compose(ports)?;
         let bare = |axis: &Axis<'_>| axis.described().si.unit != "N" && axis.gain.abs() == 1.0;
-        match self.file.axes().find(bare).filter(|_| self.certificates.force.is_none()) {
-            None => Ok(()),
-            Some(axis) => {
-                let (shown, unit) = (axis.shown(), &axis.described().si.unit);
-                Err(format!(
-                    "signal {shown} is in {unit:?}, not in N, and has neither `gain` nor certificate"
-                )
-                .into())
-            }
-        }
+        let unknown = self.file.axes().find(bare).filter(|_| self.certificates.force.is_none());
+        let Some(axis) = unknown else { return Ok(()) };
+        let (shown, unit) = (axis.shown(), &axis.described().si.unit);
+        Err(format!("signal {shown} is in {unit:?}, not in N, and has neither `gain` nor certificate").into())
     }
 
     /// The profiles of its instruments, and the files that they name, by file name: for the record.

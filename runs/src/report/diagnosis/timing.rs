@@ -15,9 +15,7 @@ pub fn section(result: &Diagnosis) -> miette::Result<String> {
         None => "no passband (passband_hz): its whole delay is found.".to_string(),
         Some(hz) => format!("a passband of {hz} Hz; its delay is taken off."),
     };
-    for c in &record.comparisons {
-        text += &format!("<p>{}.</p>", escape(&c.text));
-    }
+    text.extend(record.comparisons.iter().map(|c| format!("<p>{}.</p>", escape(&c.text))));
     let judged: Vec<&Comparison> = record.comparisons.iter().filter(|c| c.late_s.is_some()).collect();
     if judged.is_empty() {
         return Ok(text);
