@@ -79,7 +79,10 @@ impl Kernels {
         });
         let bends = bends.filter(|bend| bend.kernel.rank() > 1).collect();
         let sizes = [false, true].map(|place| {
-            let lengths = size_lengths(k, place);
+            // Over the weather, and over the place too, as smooth as a departure from form.
+            let (far, climate) = (f64::INFINITY, k.form_length);
+            let position = if place { climate } else { far };
+            let lengths = Lengths { condition: far, time: far, position, climate, seen: [true; COUNT] };
             Some((lengths, over(&weather, &lengths, false))).filter(|(_, kernel)| kernel.rank() > 1)
         });
         Kernels { smooth, bends, sizes, coordinates, weather }
@@ -129,13 +132,6 @@ pub(crate) fn beside_each_other(first: &DMatrix<f64>, other: &DMatrix<f64>) -> D
     let mut all = first.clone().resize_horizontally(before + more, 0.0);
     all.columns_mut(before, more).copy_from(other);
     all
-}
-
-/// Over the weather, and over the place too, as smooth as a departure from form.
-fn size_lengths(k: &Constants, place: bool) -> Lengths {
-    let (far, climate) = (f64::INFINITY, k.form_length);
-    let position = if place { climate } else { far };
-    Lengths { condition: far, time: far, position, climate, seen: [true; COUNT] }
 }
 
 /// Whether the size of an effect may go with the place: not where another effect of the library is that.

@@ -105,10 +105,7 @@ impl Table {
         if table.is_unsigned() {
             return Err(DataError::Unsigned);
         }
-        if reversed {
-            return Err(DataError::Reversed);
-        }
-        Ok(table)
+        if reversed { Err(DataError::Reversed) } else { Ok(table) }
     }
 
     /// Whether lateral forces are magnitudes: of one sign in both directions, and as large in one as in the
@@ -150,9 +147,7 @@ impl Table {
         if let Some(pair) = numbers.windows(2).find(|w| w[0] == w[1]) {
             return Err(DataError::DoublePoint(pair[0]));
         }
-        for p in &rows {
-            check(p)?;
-        }
+        rows.iter().try_for_each(|p| check(p))?;
         let start = origin.map_or_else(|| rows.first().map_or(0.0, |p| p.time_s), |o| o.time_s);
         let known = origin.map_or(&[][..], |o| &o.runs);
         let mut names: Vec<(Option<&str>, f64)> = known.iter().map(|(n, t)| (n.as_deref(), *t)).collect();

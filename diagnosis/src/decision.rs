@@ -190,18 +190,14 @@ fn judged(fitted: &mut Fitted, leader: usize, claimed: bool) -> (Vec<Region>, Ga
 /// be any fits what no law of the cause makes. All where the law takes up enough of the gap alone.
 fn by_its_law(fitted: &Fitted, leader: usize) -> f64 {
     let (best, gap) = (&fitted.candidates[leader].best, left(fitted, &fitted.none));
-    let bounded = best.freedom.bends == Bends::Size && !on_friction(best);
-    if bounded {
+    // What changes the friction coefficient alone may be any function.
+    let elsewhere = |effect: usize| effects::at(effect).acts.is_none_or(|acts| acts.on != Input::Friction);
+    if best.freedom.bends == Bends::Size && best.members.iter().any(|m| elsewhere(m.effect)) {
         return 1.0;
     }
     let Some(law) = best.plain.as_deref().filter(|_| gap > 0.0) else { return 1.0 };
     let taken = 1.0 - left(fitted, law) / gap;
     (taken / fitted.problem.constants.bent_law_takes).clamp(0.0, 1.0)
-}
-
-/// Whether a hypothesis changes the friction coefficient alone, so that a function of it may be any.
-fn on_friction(best: &Posterior) -> bool {
-    best.members.iter().all(|m| effects::at(m.effect).acts.is_some_and(|acts| acts.on == Input::Friction))
 }
 
 /// The leader and every hypothesis of its size that the data does not tell from it.

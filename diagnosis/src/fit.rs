@@ -7,7 +7,7 @@ use crate::gaussian::{Covariance, HALF_LN_2PI};
 use crate::law::Law;
 use crate::layout::{Layout, NUISANCES};
 pub use crate::member::Member;
-use effects::{Active, Baseline, Contact, Design, Input, Parameter, library};
+use effects::{Active, Baseline, Contact, Design, Input, library};
 use models::condition::Condition;
 use models::rig_file::CertifiedKey;
 use nalgebra::{DMatrix, DVector};
@@ -164,11 +164,6 @@ impl Problem {
         }
     }
 
-    /// Some of its rows, roughly predicted: for searches that only look for places to begin.
-    pub fn sketch(&self, rows: &[usize]) -> Self {
-        Problem { rough: true, ..self.select(rows) }
-    }
-
     /// The same problem at other conditions, where nothing was measured.
     pub fn at(&self, passes: &[Condition]) -> Self {
         let n = passes.len();
@@ -219,11 +214,9 @@ impl Problem {
 
     /// Bounds of the coordinates.
     pub fn bounds(&self, members: &[Member]) -> Vec<(f64, f64)> {
-        let mut bounds = vec![(-FARTHEST_NUISANCE, FARTHEST_NUISANCE); NUISANCES];
-        for m in members {
-            bounds.extend(m.parameters(&self.design).iter().map(Parameter::coordinate_bounds));
-        }
-        bounds
+        let own = members.iter().flat_map(|m| m.parameters(&self.design));
+        let nuisances = [(-FARTHEST_NUISANCE, FARTHEST_NUISANCE); NUISANCES].into_iter();
+        nuisances.chain(own.map(|p| p.coordinate_bounds())).collect()
     }
 
     /// Precision of the Gaussian prior of each coordinate; zero for a uniform one.

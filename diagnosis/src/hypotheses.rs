@@ -16,7 +16,6 @@
 use crate::bases::{Basis, Kernels};
 use crate::constants::Constants;
 use crate::data::{RigFile, Table};
-use crate::discrepancy::Discrepancy;
 use crate::evidence::{Posterior, averaged_over_form};
 use crate::fit::Problem;
 pub use crate::fitted::{Candidate, Fitted};
@@ -27,7 +26,7 @@ use crate::least_squares::minimise;
 use crate::noise::settle;
 use crate::pairs::pairs;
 use crate::progress::Progress;
-use crate::scatter::{Belief, Scatter};
+use crate::scatter::Belief;
 use crate::singles::{SINGLES_END, Search, lapsed, singles, sort, unlisted};
 use crate::starts::tempered;
 use crate::structure::{shapes, structure};
@@ -159,7 +158,11 @@ pub fn fit_believing(table: &Table, rig: &RigFile, options: &Options, belief: &B
     let unweighed = if options.pairs { unweighed(&candidates) } else { Vec::new() };
 
     progress.with("what the library cannot say", 0.7, || leading(&candidates));
-    let smooth = open_evidence(k, &discrepancy, &unlisted);
+    // The open set: a smooth departure of any kind, or a cause of known form that the library does not name.
+    let each = (k.unlisted_share / unlisted.len().max(1) as f64).ln();
+    let mut open = vec![discrepancy.log_evidence + (1.0 - k.unlisted_share).ln()];
+    open.extend(unlisted.iter().map(|c| c.log_evidence + each));
+    let smooth = log_sum_exp(&open);
     let top = candidates.iter().map(|c| c.log_evidence).fold(smooth, f64::max);
     let structure =
         if none_evidence > top - k.structure_asked_nats { structure(&problem, &none) } else { None };
@@ -187,8 +190,13 @@ pub fn fit_believing(table: &Table, rig: &RigFile, options: &Options, belief: &B
     // What the leading cause explains after all belongs; it counted for little, and is not called suspect.
     let surest = fitted.none_probability.max(fitted.unknown_probability);
     if let Some(c) = fitted.candidates.first().filter(|c| c.probability > surest) {
-        let belonging = explained_by(&fitted.problem, &fitted.scatter, &c.best);
-        fitted.scatter.suspects.retain(|s| !belonging.contains(&s.row));
+        let (problem, inflation) = (&fitted.problem, &fitted.scatter.inflation);
+        let explains = |row: usize| {
+            let own = problem.whole_variance(row) / inflation[row];
+            let left = problem.lateral[row] - c.best.mechanism[row];
+            left.powi(2) < problem.constants.explained_sd.powi(2) * own
+        };
+        fitted.scatter.suspects.retain(|s| !explains(s.row));
     }
     fitted
 }
@@ -202,15 +210,6 @@ fn unweighed(candidates: &[Candidate]) -> Vec<[usize; 2]> {
     let name = |e: usize| effects::at(e).name;
     let pairs = alone.iter().enumerate().flat_map(|(i, &a)| alone[i + 1..].iter().map(move |&b| [a, b]));
     pairs.filter(|p| !weighed.contains(p.as_slice()) && !one_cause(name(p[0]), name(p[1]))).collect()
-}
-
-/// Rows of suspect passes that a cause explains.
-fn explained_by(problem: &Problem, scatter: &Scatter, cause: &Posterior) -> Vec<usize> {
-    let explains = |row: &usize| {
-        let own = problem.whole_variance(*row) / scatter.inflation[*row];
-        (problem.lateral[*row] - cause.mechanism[*row]).powi(2) < problem.constants.explained_sd.powi(2) * own
-    };
-    scatter.suspects.iter().map(|s| s.row).filter(explains).collect()
 }
 
 /// Why an effect of the user's own is not sought: its table does not reach every pass.
@@ -286,12 +285,4 @@ fn second_causes(
         pair.log_evidence += freed as f64 * problem.constants.lapse_probability.ln();
     }
     grown
-}
-
-/// Evidence of the open set: a smooth departure of any kind, or a cause of known form that the library does not name.
-fn open_evidence(k: &Constants, discrepancy: &Discrepancy, unlisted: &[Candidate]) -> f64 {
-    let each = (k.unlisted_share / unlisted.len().max(1) as f64).ln();
-    let mut parts = vec![discrepancy.log_evidence + (1.0 - k.unlisted_share).ln()];
-    parts.extend(unlisted.iter().map(|c| c.log_evidence + each));
-    log_sum_exp(&parts)
 }

@@ -190,11 +190,6 @@ fn tells_nothing(problem: &Problem, rest: &Problem, best: &Posterior) -> bool {
     product(rest, &there, &there) < problem.constants.informed_share * whole
 }
 
-/// All other rows.
-fn without(problem: &Problem, rows: &[usize]) -> Vec<usize> {
-    (0..problem.len()).filter(|i| rows.binary_search(i).is_err()).collect()
-}
-
 /// Rounds of a refit without a region.
 const ROUNDS: usize = 6;
 
@@ -222,7 +217,7 @@ pub fn left_out_regions(fitted: &Fitted, best: &Posterior) -> Vec<Region> {
     regions(problem)
         .into_par_iter()
         .map(|Part { name, over, rows }| {
-            let others = without(problem, &rows);
+            let others: Vec<_> = (0..problem.len()).filter(|i| rows.binary_search(i).is_err()).collect();
             let shown = own.iter().all(|change| {
                 let seen: f64 = others.iter().map(|&i| change[i]).sum();
                 seen > k.informed_share * change.iter().sum::<f64>()

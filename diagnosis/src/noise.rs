@@ -44,7 +44,11 @@ pub fn settle(
     problem: &mut Problem,
     belief: &Belief,
 ) -> (Discrepancy, PureError, Scatter) {
-    let rough = rough(problem, rig);
+    let rough = |(l, p): (&f64, &Condition)| {
+        let level = l.abs() + ROUGH_LEVEL * problem.nominal.mu0 * p.normal_force_n;
+        (ROUGH_SD * level).powi(2) + rig.noise.force_sd_n.powi(2)
+    };
+    let rough: Vec<f64> = problem.lateral.iter().zip(&problem.passes).map(rough).collect();
     let mut start = minimise(problem, &[], &[0.0; 3], &rough, START_ROUNDS);
     // A pass far off must not carry the start with it: beyond some deviations it counts by its distance.
     let bounded: Vec<f64> = (0..problem.len())
@@ -67,14 +71,6 @@ pub fn settle(
     scatter.enter(table, problem);
     let lengths = lengths(&problem.constants, table);
     (Discrepancy::fit(table, problem, &center, &lengths), pure, scatter)
-}
-
-fn rough(problem: &Problem, rig: &RigFile) -> Vec<f64> {
-    let one = |(l, p): (&f64, &Condition)| {
-        let level = l.abs() + ROUGH_LEVEL * problem.nominal.mu0 * p.normal_force_n;
-        (ROUGH_SD * level).powi(2) + rig.noise.force_sd_n.powi(2)
-    };
-    problem.lateral.iter().zip(&problem.passes).map(one).collect()
 }
 
 /// Variances given the level of friction: relative scatter, noise of the lateral axis, and that of the normal

@@ -39,7 +39,9 @@ pub fn widened(
         parts.par_iter().filter_map(|out| misses(fitted, table, rig, answer, out)).collect()
     };
     let of_run = if rows().any(strange) { Misses::of_another(&measure(runs(table))) } else { STATED };
-    let of_time = if rows().any(later) { Misses::at_worst(&measure(ends(table))) } else { STATED };
+    // Ends of the table, predicted from what was seen before.
+    let ends = CUTS.iter().map(|from| ((table.len() as f64 * from) as usize..table.len()).collect());
+    let of_time = if rows().any(later) { Misses::at_worst(&measure(ends.collect())) } else { STATED };
     for (i, f) in forecasts.iter_mut().enumerate() {
         let own = if strange(i) { of_run } else { STATED };
         let own = if later(i) { own.worst(of_time) } else { own };
@@ -89,12 +91,6 @@ fn runs(table: &Table) -> Vec<Vec<usize>> {
         return Vec::new();
     }
     (0..table.run_count).map(|run| (0..table.len()).filter(|&i| table.runs[i] == run).collect()).collect()
-}
-
-/// Ends of the table, predicted from what was seen before.
-fn ends(table: &Table) -> Vec<Vec<usize>> {
-    let n = table.len() as f64;
-    CUTS.iter().map(|from| ((n * from) as usize..table.len()).collect()).collect()
 }
 
 /// How far the passes left out lie from their prediction; none where too few are left, or out.

@@ -172,7 +172,8 @@ impl Hunt<'_> {
     }
 
     fn part(&self, rows: &[usize]) -> (Problem, Vec<f64>) {
-        (self.problem.sketch(rows), rows.iter().map(|&i| self.variance[i]).collect())
+        let sketch = Problem { rough: true, ..self.problem.select(rows) };
+        (sketch, rows.iter().map(|&i| self.variance[i]).collect())
     }
 
     /// The whole grid of the last member, on the rows that show it: those rows, and every place with its

@@ -40,7 +40,9 @@ pub fn conditions(table: &Table) -> Vec<Condition> {
     let list = with_each(&list, &in_ratio(of(&|p| p.normal_force_n), LOADS), |c| &mut c.normal_force_n);
     let list = with_each(&list, &positions, |c| &mut c.position_m);
     let list = with_each(&list, &pressures, |c| &mut c.ambient_pressure_pa);
-    let mut list = with_each(&list, &directions(table), |c| &mut c.direction);
+    let seen = |d: &Direction| passes.iter().any(|p| p.direction == *d);
+    let directions = [Direction::Forward, Direction::Backward].into_iter().filter(seen).collect::<Vec<_>>();
+    let mut list = with_each(&list, &directions, |c| &mut c.direction);
     let (low, high) = (positions[0], positions[positions.len() - 1]);
     let shown = |p: &Condition| {
         let as_fast = || passes.iter().filter(|q| q.speed_m_s > 0.95 * p.speed_m_s);
@@ -85,12 +87,6 @@ pub fn expected_change_n(wanted: &Condition, model: &dyn FrictionModel, mu0: f64
     }
     let prediction = model.predict(&Condition { mu0, ..*wanted }).ok()?;
     Some((1.0 - prediction.mu_relative).abs() * coulomb_n)
-}
-
-/// Directions of the table.
-fn directions(table: &Table) -> Vec<Direction> {
-    let seen = |d: &Direction| table.passes.iter().any(|p| p.direction == *d);
-    [Direction::Forward, Direction::Backward].into_iter().filter(seen).collect()
 }
 
 /// Evenly in the logarithm from the smallest to the largest.
