@@ -296,3 +296,54 @@ fn a_comparison_gates_a_pipeline() {
     let (status, (_, told)) = call(&["compare", "base", "gain"]);
     assert!(status == Some(2) && told.contains("without a record, run.toml"), "{told}");
 }
+
+/// The passes that a verdict wants are judged with those that it came from, as a second run of the rig.
+#[test]
+fn a_further_experiment_is_diagnosed_with_the_first_run() {
+    let folder = tempfile::tempdir().unwrap();
+    let call = |arguments: &[&str]| {
+        let output = muprime().args(arguments).current_dir(folder.path()).output().unwrap();
+        (output.status.code(), texts(&output))
+    };
+    assert_eq!(call(&["run", "--fast", "--out", "first"]).0, Some(0));
+    let (_, (_, told)) = call(&["diagnose", "first", "--save-plan", "next.toml", "--no-pairs"]);
+    let next = "next: muprime run next.toml --out NEXT; then muprime diagnose first NEXT, both together";
+    assert!(told.contains(next), "{told}");
+    assert_eq!(call(&["run", "next.toml", "--fast", "--out", "second"]).0, Some(0));
+    let lines = |run: &str| {
+        let table = std::fs::read_to_string(folder.path().join(run).join("points.csv")).unwrap();
+        table.lines().count() - 1
+    };
+    let of = |arguments: &[&str]| {
+        let (status, (printed, told)) = call(&[&["diagnose", "--json", "--no-pairs"], arguments].concat());
+        assert_eq!(status, Some(0), "{told}");
+        serde_json::from_str::<serde_json::Value>(&printed).unwrap()
+    };
+    let (alone, both) = (of(&["first"]), of(&["second", "first"]));
+    assert_eq!(both["hypotheses"][0]["effects"], serde_json::json!(["squeeze_film"]));
+    assert_eq!(both["data"]["points"], lines("first") + lines("second"));
+    assert!(both["scatter"]["run_relative_sd"].is_number() && alone["scatter"]["run_relative_sd"].is_null());
+    for experiment in both["next_experiment"].as_array().unwrap() {
+        // A verdict states no more than the chance of an error that nobody sees allows.
+        let odds = experiment["expected_odds"].as_f64();
+        assert!(odds.is_none_or(|odds| (1.0..=100.0).contains(&odds)), "{experiment}");
+        assert_eq!(odds.is_none(), experiment["separates"].to_string().contains("unknown"), "{experiment}");
+    }
+    let width = |verdict: &serde_json::Value| {
+        let parameters = verdict["hypotheses"][0]["parameters"].as_array().unwrap();
+        let exponent = parameters.iter().find(|p| p["name"] == "amplitude_exponent").expect("an exponent");
+        exponent["ci95"][1].as_f64().unwrap() - exponent["ci95"][0].as_f64().unwrap()
+    };
+    assert!(width(&both) < width(&alone), "{} and {}", width(&both), width(&alone));
+    let refused = |arguments: &[&str], why: &str| {
+        let (status, (_, told)) = call(&[&["diagnose"], arguments].concat());
+        assert!(status == Some(2) && told.contains(why), "{arguments:?}: {told}");
+    };
+    refused(&["first", "./first"], "holds the same passes");
+    refused(&["first", "second", "--in-folder"], "folder of one run");
+    let rig = folder.path().join("second/rig.toml");
+    let text = std::fs::read_to_string(&rig).unwrap();
+    std::fs::write(&rig, text.replace("force_sd_n = 0.0008", "force_sd_n = 0.0009")).unwrap();
+    refused(&["first", "second"], "rig.toml differ");
+    assert_eq!(call(&["diagnose", "first", "second", "--rig", "first/rig.toml", "--no-pairs"]).0, Some(0));
+}

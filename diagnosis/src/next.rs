@@ -10,6 +10,7 @@ pub mod design;
 pub mod grid;
 pub mod predictive;
 
+use crate::constants::Constants;
 use crate::data::{RigFile, Table};
 use crate::decision::{Decision, Verdict};
 use crate::describe::plain;
@@ -30,8 +31,13 @@ pub struct Experiment {
     pub conditions: Vec<Condition>,
     /// The two hypotheses that it parts: the leader and its strongest rival.
     pub separates: [String; 2],
-    /// Expected gain of the first one's log evidence over the second's, were the first one true.
+    /// Expected gain of the first one's log evidence over the second's, were the first one true. A verdict
+    /// counts less of it: `expected_odds`.
     pub expected_nats: f64,
+    /// Odds of the first over the second that these passes would add in a verdict, were the first one true. A
+    /// verdict counts half the nats, and states no odds above those of an error that nobody sees: at most
+    /// 100. None against an unknown cause, which predicts nothing.
+    pub expected_odds: Option<f64>,
     /// In words.
     pub text: String,
 }
@@ -44,20 +50,38 @@ fn settings<S: Serializer>(conditions: &[Condition], serializer: S) -> Result<S:
     serializer.collect_seq(conditions.iter().map(of))
 }
 
+/// The name of the open set among hypotheses.
+const UNKNOWN: &str = "unknown";
 /// Passes of a designed experiment.
 pub const PASSES: usize = 12;
 /// Least change of force that a proposal is made for, in deviations of a pass (`force_sd_n`). A run refuses
 /// a series below one; twice that, since the setup's mu_0 may differ from the table's.
 const SEEN: f64 = 2.0;
 
-/// Odds that are expected of an experiment.
-pub fn odds(nats: f64) -> String {
-    if nats > 6.0 * std::f64::consts::LN_10 {
-        return "odds above 10^6".into();
+impl Experiment {
+    fn of(
+        conditions: Vec<Condition>,
+        separates: [String; 2],
+        nats: f64,
+        text: String,
+        k: &Constants,
+    ) -> Self {
+        let known = separates.iter().all(|name| name != UNKNOWN);
+        let expected_odds = known.then(|| (nats / k.temper).exp().min(1.0 / k.doubt));
+        Experiment { conditions, separates, expected_nats: nats, expected_odds, text }
     }
-    // Two significant digits.
-    let unit = 10_f64.powf((nats / std::f64::consts::LN_10).floor() - 1.0).max(1.0);
-    format!("odds of {:.0} to 1", (nats.exp() / unit).round() * unit)
+
+    /// What is expected of it, a sentence.
+    pub fn worth(&self) -> String {
+        let [leader, rival] = self.separates.each_ref().map(|name| words(name));
+        let odds = match self.expected_odds {
+            // The most that a verdict states.
+            Some(odds) if odds > 99.0 => "odds above 100 to 1".to_string(),
+            Some(odds) => format!("odds of {odds:.*} to 1", usize::from(odds < 10.0)),
+            None => return format!("No odds against {rival} can be stated."),
+        };
+        format!("If {leader} is true, {odds} against {rival} are expected.")
+    }
 }
 
 /// Designs experiments for what a decision left open.
@@ -76,7 +100,7 @@ pub fn experiments(fitted: &Fitted, table: &Table, rig: &RigFile, decision: &Dec
 
 /// A hypothesis of [`Experiment::separates`] as a sentence has it.
 pub fn words(name: &str) -> String {
-    if name == "unknown" { "an unknown cause".to_string() } else { plain(name) }
+    if name == UNKNOWN { "an unknown cause".to_string() } else { plain(name) }
 }
 
 /// The passes that best part the hypotheses, among conditions whose change of force a run on this rig
@@ -102,19 +126,23 @@ fn designed(fitted: &Fitted, table: &Table, rig: &RigFile, decision: &Decision) 
     let rival = design::rival(&hypotheses)?;
     let nats = design::expected_nats(&hypotheses[0], &hypotheses[rival], &chosen);
     let separates = [hypotheses[0].name.clone(), hypotheses[rival].name.clone()];
+    if nats <= k.design_least_nats {
+        return None;
+    }
     let [leader, other] = separates.each_ref().map(|name| words(name));
-    let mut text = format!(
-        "{PASSES} more passes would distinguish {leader} from {other} and from the other causes ({} expected).",
-        odds(nats)
+    let conditions = chosen.iter().map(|&i| grid[i]).collect();
+    let mut found = Experiment::of(conditions, separates, nats, String::new(), k);
+    found.text = format!(
+        "{PASSES} more passes would distinguish {leader} from {other} and from the other causes. {}",
+        found.worth()
     );
     if grid.len() < all {
-        text.push_str(&format!(
+        found.text.push_str(&format!(
             " Conditions that change the force by less than {:.2} mN are left out: the sensor does not resolve them.",
             1e3 * least_n
         ));
     }
-    let conditions = chosen.iter().map(|&i| grid[i]).collect();
-    (nats > k.design_least_nats).then_some(Experiment { conditions, separates, expected_nats: nats, text })
+    Some(found)
 }
 
 /// Actions on instruments that part the leader from the next candidate.
@@ -124,7 +152,7 @@ fn actions(fitted: &Fitted, decision: &Decision) -> Vec<Experiment> {
         (0..fitted.candidates.len()).find(|&i| i != leader && fitted.candidates[i].effects.len() == 1)
     });
     let Some(second) = second else { return Vec::new() };
-    let (a, b) = (&fitted.candidates[leader], &fitted.candidates[second]);
+    let (a, b, k) = (&fitted.candidates[leader], &fitted.candidates[second], &fitted.problem.constants);
     let mut list = Vec::new();
     for (one, other) in [(a, b), (b, a)] {
         let thetas = fitted.problem.thetas(&one.best.members, &one.best.by_law().u);
@@ -133,13 +161,9 @@ fn actions(fitted: &Fitted, decision: &Decision) -> Vec<Experiment> {
             else {
                 continue;
             };
-            list.push(Experiment {
-                conditions: Vec::new(),
-                separates: [a.names().join("+"), b.names().join("+")],
-                expected_nats: (0.5 * (theta[0] / check.sd).powi(2))
-                    .min(fitted.problem.constants.check_most_nats),
-                text: check.action.to_string(),
-            });
+            let nats = (0.5 * (theta[0] / check.sd).powi(2)).min(k.check_most_nats);
+            let separates = [a.names().join("+"), b.names().join("+")];
+            list.push(Experiment::of(Vec::new(), separates, nats, check.action.to_string(), k));
         }
     }
     list

@@ -195,11 +195,7 @@ pub fn terminal(result: &Diagnosis) -> String {
         for e in r.next_experiment.iter().take(4) {
             text.push_str(&format!("  {}", e.text));
             if e.conditions.is_empty() {
-                let [a, b] = e.separates.each_ref().map(|name| plain(name));
-                text.push_str(&format!(
-                    " (separates {a} from {b}: {} expected)",
-                    diagnosis::next::odds(e.expected_nats)
-                ));
+                text.push_str(&format!(" {}", e.worth()));
             }
             text.push('\n');
         }
@@ -243,6 +239,7 @@ mod tests {
             conditions: conditions.clone(),
             separates: ["a".to_string(), "b".to_string()],
             expected_nats: 3.0,
+            expected_odds: None,
             text: "4 passes that part \"a\" from b".to_string(),
         };
         let plan = Plan::parse("next.toml", &plan(&experiment)).expect("a plan that can be read");

@@ -4,6 +4,7 @@
 //! |---|---|
 //! | [`mod@import`] | foreign tables made into point tables |
 //! | [`export`] | a run's passes and record in the formats of other programs |
+//! | [`joined`] | several runs or tables of one rig as one table |
 //! | [`law`] | a friction law by name or from a file; a law that was tabulated |
 //! | [`passes`] | a point table from its bytes, CSV or Parquet |
 //! | [`schemas`] | schemas from the types, commented beginnings, what is bundled |
@@ -15,6 +16,7 @@
 pub mod check;
 pub mod export;
 pub mod import;
+pub mod joined;
 pub mod law;
 pub mod passes;
 pub mod schemas;

@@ -13,6 +13,7 @@ use runs::print::folded;
 use runs::verdict::files;
 use std::sync::{Arc, Mutex, PoisonError};
 use tables::check::refusal;
+use tables::joined::{Part, joined, start_of};
 use tables::passes::parse_passes;
 use tables::verdict::{self, Subject, unfit};
 
@@ -22,8 +23,10 @@ const PRINTED: usize = 6;
 /// Say where simulation and reality differ on a table of passes, which effect causes it, and how far it shrinks.
 #[derive(Debug, clap::Args)]
 pub struct Args {
-    /// A point table (CSV or Parquet), or a run's folder with points.csv and rig.toml.
-    pub data: PathBuf,
+    /// A point table (CSV or Parquet), or a run's folder with points.csv and rig.toml. Several of one rig are
+    /// diagnosed together, each as a run of its own.
+    #[arg(required = true)]
+    pub data: Vec<PathBuf>,
     /// What the rig's calibration states; without it, the rig.toml beside the table.
     #[arg(long)]
     pub rig: Option<PathBuf>,
@@ -63,29 +66,52 @@ pub struct Args {
 
 /// The files that a diagnosis is of.
 struct Inputs<'a> {
-    table: PathBuf,
+    tables: Vec<PathBuf>,
     rig: PathBuf,
-    /// The folder, where a run is diagnosed.
+    /// The folder, where one run is diagnosed.
     run: Option<&'a Path>,
+}
+
+impl<'a> Inputs<'a> {
+    fn of(args: &'a Args) -> miette::Result<Self> {
+        args.data.iter().try_for_each(|data| super::there(data, "run or table"))?;
+        let both = |data: &PathBuf| verdict::inputs(data, args.rig.clone());
+        let (tables, rigs): (Vec<_>, Vec<_>) = args.data.iter().map(both).unzip();
+        let bytes = |rig: &PathBuf| std::fs::read(rig).ok();
+        let rig = rigs[0].clone();
+        if let Some(other) = rigs.iter().find(|other| bytes(other).is_some_and(|b| Some(b) != bytes(&rig))) {
+            let help = "tables that are diagnosed together are of one rig in one state: --rig names the file that holds for all";
+            miette::bail!(help = help, "{} and {} differ", rig.display(), other.display());
+        }
+        let run = args.data.first().filter(|data| args.data.len() == 1 && data.is_dir()).map(|data| &**data);
+        if args.in_folder && run.is_none() {
+            let what = if args.data.len() > 1 { "several are given" } else { "this is a table" };
+            miette::bail!(
+                help = "give the folder of one run",
+                "--in-folder: {}: {what}",
+                args.data[0].display()
+            );
+        }
+        Ok(Inputs { tables, rig, run })
+    }
+
+    /// The tables as a text names them.
+    fn shown(&self) -> String {
+        self.tables.iter().map(|table| table.display().to_string()).collect::<Vec<_>>().join(", ")
+    }
 }
 
 /// Reads, diagnoses, writes the requested files: none of them where a table or a rig is refused, or a file
 /// cannot be read or written.
 pub fn run(args: Args, json: bool) -> miette::Result<ExitCode> {
-    super::there(&args.data, "run or table")?;
-    let run = args.data.is_dir().then_some(&*args.data);
-    let (table, rig) = verdict::inputs(&args.data, args.rig.clone());
-    let inputs = Inputs { table, rig, run };
-    if args.in_folder && run.is_none() {
-        miette::bail!(help = "give the folder of a run", "--in-folder: {} is a table", args.data.display());
-    }
-    let (subject, damage) = read(&inputs, args.model.as_deref())?;
+    let inputs = Inputs::of(&args)?;
+    let (subject, damage) = read(&inputs, &args)?;
     let options = options(&args)?;
     let conditions = args.predict.as_ref().map(|path| conditions(path, &subject)).transpose()?;
     places(&args)?;
     let bar = studies::progress::bar(1000, "per mille");
     let progress = follow(&bar, json)?;
-    let mut result = subject.diagnose(Options { progress, ..options }, run)?;
+    let mut result = subject.diagnose(Options { progress, ..options }, inputs.run)?;
     result.report.remarks.extend(conditions.as_ref().and_then(|c| outside(&subject.table, c)));
     bar.finish_and_clear();
     if let (Some(conditions), Some(out)) = (&conditions, &args.predictions) {
@@ -131,30 +157,40 @@ fn places(args: &Args) -> miette::Result<()> {
     Ok(())
 }
 
-/// The table on its base law, with the rig's calibration; and what is damaged in a run's folder.
-fn read(inputs: &Inputs<'_>, model: Option<&Path>) -> miette::Result<(Subject, Vec<String>)> {
-    let Inputs { table, rig, run } = inputs;
-    let named = rig.display().to_string();
-    let rig = runs::input::rig_file(rig)
+/// The table on its base law, with the rig's calibration; and what is damaged in the folders of runs.
+fn read(inputs: &Inputs<'_>, args: &Args) -> miette::Result<(Subject, Vec<String>)> {
+    let named = inputs.rig.display().to_string();
+    let rig = runs::input::rig_file(&inputs.rig)
         .map_err(|why| refusal(why, &named, "rig.toml"))
         .wrap_err_with(|| format!("{named}: noise and stiffnesses of the rig (--rig names the file)"))?;
-    let damage = run.map_or(Ok(Vec::new()), runs::run_dir::damage_in)?;
-    let bytes = bytes_of(table, MAX_TABLE_BYTES)
-        .wrap_err_with(|| format!("cannot read the table {}", table.display()))?;
-    let passes = parse_passes(table, &bytes).map_err(|why| refused(why, table))?;
-    let shown = || table.display().to_string();
-    let rendered = run.is_some_and(|run| run.join(runs::fidelity::FILE).is_file());
-    let whole = Subject::of(passes, &bytes, rig).map_err(|why| {
+    let (mut parts, mut damage, mut all, mut rendered) = (Vec::<Part>::new(), Vec::new(), Vec::new(), false);
+    for (data, table) in args.data.iter().zip(&inputs.tables) {
+        let bytes = bytes_of(table, MAX_TABLE_BYTES)
+            .wrap_err_with(|| format!("cannot read the table {}", table.display()))?;
+        let passes = parse_passes(table, &bytes).map_err(|why| refused(why, table))?;
+        let name = data.display().to_string();
+        if let Some(same) = parts.iter().find(|part| part.passes == passes) {
+            miette::bail!(help = "give each run once", "{name} holds the same passes as {}", same.name);
+        }
+        if data.is_dir() {
+            damage.extend(runs::run_dir::damage_in(data)?);
+            rendered |= data.join(runs::fidelity::FILE).is_file();
+        }
+        parts.push(Part { name, passes, start_unix_s: start_of(data) });
+        all.extend(bytes);
+    }
+    let whole = Subject::of(joined(parts), &all, rig).map_err(|why| {
         let help = "passes that render have no steady friction: diagnose a sweep of the same rig, and give its \
                     corrected model to the rendering";
-        match rendered {
-            true => miette::miette!(help = help, "{why}").wrap_err(shown()),
-            false => refused(unfit(why), table),
+        match (rendered, &inputs.tables[..]) {
+            (true, _) => miette::miette!(help = help, "{why}").wrap_err(inputs.shown()),
+            (false, [table]) => refused(unfit(why), table),
+            (false, _) => unfit(why).wrap_err(inputs.shown()),
         }
     })?;
-    let Some(what) = model else { return Ok((whole, damage)) };
+    let Some(what) = &args.model else { return Ok((whole, damage)) };
     let base = tables::law::for_finger(what, &whole.rig.finger)?;
-    Ok((whole.on(base).into_diagnostic().wrap_err_with(shown)?, damage))
+    Ok((whole.on(base).into_diagnostic().wrap_err_with(|| inputs.shown())?, damage))
 }
 
 /// A table that cannot be diagnosed, with all that is wrong with it.
@@ -196,7 +232,12 @@ fn save_next(args: &Args, result: &Diagnosis) -> miette::Result<()> {
     }
     if let Some(out) = &args.save_plan {
         match runs::verdict::next_plan(result) {
-            Some(plan) => write_output(out, plan)?,
+            Some(plan) => {
+                write_output(out, plan)?;
+                let all: Vec<_> = args.data.iter().map(|data| data.display().to_string()).collect();
+                let (all, plan) = (all.join(" "), out.display());
+                say!("next: muprime run {plan} --out NEXT; then muprime diagnose {all} NEXT, both together");
+            }
             None => say!("no plan written to {}: no conditions would tell more", out.display()),
         }
     }
@@ -214,19 +255,20 @@ fn write_page(
     let page = match inputs.run {
         Some(run) => subject.page_of_run(result, run)?,
         None => {
-            let [table, rig] = [&inputs.table, &inputs.rig].map(|path| path.display().to_string());
-            subject.page_of_table(result, &table, &rig)?
+            let rig = inputs.rig.display().to_string();
+            subject.page_of_table(result, &inputs.shown(), &rig)?
         }
     };
     if args.in_folder {
-        files::write(&args.data, result, &subject.rig, &page, damage)?;
-        say!("verdict: {}", args.data.join(files::PAGE).display());
+        files::write(&args.data[0], result, &subject.rig, &page, damage)?;
+        say!("verdict: {}", args.data[0].join(files::PAGE).display());
     }
     if let Some(out) = &args.report {
         write_output(out, &page)?;
         say!("report: {}", out.display());
         // The run that this is the table of.
-        let run = inputs.table.parent().filter(|run| run.join("passes.jsonl").exists());
+        let [table] = &inputs.tables[..] else { return Ok(()) };
+        let run = table.parent().filter(|run| run.join("passes.jsonl").exists());
         if let Some(run) = run.filter(|_| !args.in_folder) {
             keep_in_run(run, out, &page);
         }

@@ -2,7 +2,7 @@
 
 use crate::human::{number, titled};
 use crate::report::html::{column, escape, numeric, table};
-use diagnosis::next::{Experiment, odds, words};
+use diagnosis::next::Experiment;
 use diagnosis::verdict::Diagnosis;
 use models::condition::Condition;
 use models::covariate::{self, Covariate};
@@ -17,13 +17,8 @@ pub fn section(result: &Diagnosis) -> String {
     format!("<h2>What to do next</h2>{all}")
 }
 
-fn worth(e: &Experiment) -> String {
-    let [a, b] = e.separates.each_ref().map(|name| words(name));
-    format!("If {a} is true, {} against {b} are expected.", odds(e.expected_nats))
-}
-
 fn one(e: &Experiment) -> String {
-    let worth = escape(&worth(e));
+    let worth = escape(&e.worth());
     if e.conditions.is_empty() {
         let text = escape(&e.text);
         return format!("<div class=\"card\"><p><strong>{text}</strong></p><p>{worth}</p></div>");
@@ -50,25 +45,4 @@ fn as_address(text: &str) -> String {
     let plain = |b: u8| b.is_ascii_alphanumeric() || b"-_.~".contains(&b);
     let byte = |b: u8| if plain(b) { char::from(b).to_string() } else { format!("%{b:02X}") };
     format!("data:application/toml;charset=utf-8,{}", text.bytes().map(byte).collect::<String>())
-}
-
-#[cfg(test)]
-mod tests {
-    use super::*;
-
-    /// The page had 49840 to 1 where the terminal had 50000 to 1.
-    #[test]
-    fn odds_are_those_of_the_terminal() {
-        let separates = ["squeeze_film", "normal_offset"].map(String::from);
-        let of = |expected_nats: f64| {
-            worth(&Experiment {
-                conditions: Vec::new(),
-                separates: separates.clone(),
-                expected_nats,
-                text: String::new(),
-            })
-        };
-        assert!(of(49_840_f64.ln()).contains(", odds of 50000 to 1 against"), "{}", of(49_840_f64.ln()));
-        assert!(of(125.0).contains(", odds above 10^6 against"), "{}", of(125.0));
-    }
 }
