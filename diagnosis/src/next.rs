@@ -78,7 +78,7 @@ impl Experiment {
             // The most that a verdict states.
             Some(odds) if odds > 99.0 => "odds above 100 to 1".to_string(),
             Some(odds) => format!("odds of {odds:.*} to 1", usize::from(odds < 10.0)),
-            None => return format!("No odds against {rival} can be stated."),
+            None => return format!("No odds are stated against {rival}, which predicts nothing."),
         };
         format!("If {leader} is true, {odds} against {rival} are expected.")
     }
