@@ -77,9 +77,10 @@ impl<'a> Inputs<'a> {
         args.data.iter().try_for_each(|data| super::there(data, "run or table"))?;
         let both = |data: &PathBuf| verdict::inputs(data, args.rig.clone());
         let (tables, rigs): (Vec<_>, Vec<_>) = args.data.iter().map(both).unzip();
-        let bytes = |rig: &PathBuf| std::fs::read(rig).ok();
+        let bytes = |rig: &PathBuf| bytes_of(rig, MAX_TABLE_BYTES).ok();
         let rig = rigs[0].clone();
-        if let Some(other) = rigs.iter().find(|other| bytes(other).is_some_and(|b| Some(b) != bytes(&rig))) {
+        let differs = |other: &&PathBuf| bytes(other).zip(bytes(&rig)).is_some_and(|(a, b)| a != b);
+        if let Some(other) = rigs[1..].iter().find(differs) {
             let help = "tables that are diagnosed together are of one rig in one state: --rig names the file that holds for all";
             miette::bail!(help = help, "{} and {} differ", rig.display(), other.display());
         }
