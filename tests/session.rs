@@ -323,8 +323,8 @@ fn a_further_experiment_is_diagnosed_with_the_first_run() {
     assert_eq!(both["hypotheses"][0]["effects"], serde_json::json!(["squeeze_film"]));
     assert_eq!(both["data"]["points"], lines("first") + lines("second"));
     assert!(both["scatter"]["run_relative_sd"].is_number() && alone["scatter"]["run_relative_sd"].is_null());
-    for experiment in both["next_experiment"].as_array().unwrap() {
-        // A verdict states no more than the chance of an error that nobody sees allows.
+    let next = both["next_experiment"].as_array().filter(|list| !list.is_empty());
+    for experiment in next.expect("a further experiment") {
         let odds = experiment["expected_odds"].as_f64();
         assert!(odds.is_none_or(|odds| (1.0..=100.0).contains(&odds)), "{experiment}");
         assert_eq!(odds.is_none(), experiment["separates"].to_string().contains("unknown"), "{experiment}");

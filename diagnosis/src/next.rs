@@ -34,9 +34,9 @@ pub struct Experiment {
     /// Expected gain of the first one's log evidence over the second's, were the first one true. A verdict
     /// counts less of it: `expected_odds`.
     pub expected_nats: f64,
-    /// Odds of the first over the second that these passes would add in a verdict, were the first one true. A
-    /// verdict counts half the nats, and states no odds above those of an error that nobody sees: at most
-    /// 100. None against an unknown cause, which predicts nothing.
+    /// Factor by which these passes would raise the odds of the first over the second in a verdict, were the
+    /// first one true. A verdict counts half the nats; at most 100, as often as the method may err unseen. None
+    /// against an unknown cause, which may be anything.
     pub expected_odds: Option<f64>,
     /// In words.
     pub text: String,
@@ -75,10 +75,10 @@ impl Experiment {
     pub fn worth(&self) -> String {
         let [leader, rival] = self.separates.each_ref().map(|name| words(name));
         let odds = match self.expected_odds {
-            // The most that a verdict states.
+            // The limit of `Experiment::of`.
             Some(odds) if odds > 99.0 => "odds above 100 to 1".to_string(),
             Some(odds) => format!("odds of {odds:.*} to 1", usize::from(odds < 10.0)),
-            None => return format!("No odds are stated against {rival}, which predicts nothing."),
+            None => return format!("No odds are stated against {rival}, which may be anything."),
         };
         format!("If {leader} is true, {odds} against {rival} are expected.")
     }
@@ -167,4 +167,27 @@ fn actions(fitted: &Fitted, decision: &Decision) -> Vec<Experiment> {
         }
     }
     list
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// 125 nats were odds above 10^6, which verdicts on all passes did not have.
+    #[test]
+    fn odds_are_those_that_a_verdict_counts() {
+        let worth = |rival: &str, nats: f64| {
+            let separates = ["squeeze_film".to_string(), rival.to_string()];
+            Experiment::of(Vec::new(), separates, nats, String::new(), &Constants::default()).worth()
+        };
+        // exp(4 / 2) = 7.4; exp(6 / 2) = 20.1.
+        let start = "If squeeze film is true, odds";
+        assert_eq!(worth("adhesion", 4.0), format!("{start} of 7.4 to 1 against adhesion are expected."));
+        assert_eq!(worth("adhesion", 6.0), format!("{start} of 20 to 1 against adhesion are expected."));
+        assert_eq!(
+            worth("adhesion", 125.0),
+            format!("{start} above 100 to 1 against adhesion are expected.")
+        );
+        assert!(worth(UNKNOWN, 125.0).starts_with("No odds are stated against an unknown cause"));
+    }
 }

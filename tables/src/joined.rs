@@ -41,7 +41,7 @@ pub fn joined(mut parts: Vec<Part>) -> Vec<Pass> {
         let begin_s = times().fold(f64::INFINITY, f64::min);
         let recorded_s = part.start_unix_s.zip(first_unix_s).map_or(0.0, |(own, first)| own - first);
         let shift_s = recorded_s.max(end_s - begin_s);
-        end_s = shift_s + times().fold(f64::NEG_INFINITY, f64::max);
+        end_s = end_s.max(shift_s + times().fold(f64::NEG_INFINITY, f64::max));
         all.extend(part.passes.into_iter().map(|p| Pass {
             point: p.point.saturating_add(k.saturating_mul(apart)),
             time_s: p.time_s + shift_s,
@@ -82,6 +82,14 @@ mod tests {
             let all = seen(vec![part("a", starts.0, [1.0, 50.0]), second(starts.1)]);
             assert_eq!((all[2].2, all[3].2), (50.0, 109.5), "{starts:?}");
         }
+    }
+
+    /// A run that has no pass yet takes no time from those around it.
+    #[test]
+    fn a_part_without_passes_changes_nothing() {
+        let empty = Part { name: "c".into(), passes: Vec::new(), start_unix_s: None };
+        let all = seen(vec![part("a", None, [1.0, 50.0]), empty, part("b", None, [0.5, 60.0])]);
+        assert_eq!((all[2].1, all[2].2), (207, 50.0));
     }
 
     #[test]

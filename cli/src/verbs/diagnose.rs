@@ -81,7 +81,8 @@ impl<'a> Inputs<'a> {
         let rig = rigs[0].clone();
         let differs = |other: &&PathBuf| bytes(other).zip(bytes(&rig)).is_some_and(|(a, b)| a != b);
         if let Some(other) = rigs[1..].iter().find(differs) {
-            let help = "tables that are diagnosed together are of one rig in one state: --rig names the file that holds for all";
+            let help = "tables that are diagnosed together are of one rig in one state: --rig names the file that \
+                        holds for all";
             miette::bail!(help = help, "{} and {} differ", rig.display(), other.display());
         }
         let run = args.data.first().filter(|data| args.data.len() == 1 && data.is_dir()).map(|data| &**data);
