@@ -40,7 +40,7 @@ pub mod watch;
 /// What nearly every verb needs.
 mod prelude {
     pub use super::{DONE, FAILED, REFUSED, answered, exit};
-    pub use ::runs::print::answer_json;
+    pub use ::runs::print::{answer_json, quoted};
     pub use ::runs::{out, say};
     pub use miette::{IntoDiagnostic, WrapErr};
     pub use serde_json::json;

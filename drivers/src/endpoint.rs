@@ -158,6 +158,8 @@ pub struct Endpoint {
     alarm_until: Nanos,
     /// The fault that stops the rig and that it reports now, by its place in the profile.
     fault: Option<usize>,
+    /// Which of the profile's faults hold now.
+    holds: Vec<bool>,
     arrived: Nanos,
     /// What a sensor shows is not handed on yet: it is not set up.
     held: bool,
@@ -304,6 +306,7 @@ impl Endpoint {
             orders: Orders::of(commands),
             alarm_until: Nanos(0),
             fault: None,
+            holds: vec![false; profile.description.fault.len()],
             arrived: Nanos(0),
             held: false,
             health: Arc::default(),
@@ -343,13 +346,19 @@ impl Endpoint {
         })?;
         self.seen[frame.0] = true;
         self.arrived = arrived;
-        if self.seen.iter().all(|&seen| seen)
-            && let Some(broken) = self.profile.broken_signature(&self.values)
-        {
+        let all_seen = self.seen.iter().all(|&seen| seen);
+        if all_seen && let Some(broken) = self.profile.broken_signature(&self.values) {
             self.health.count(&self.health.corrupt_frames);
             let signature = &self.profile.description.signature[broken];
             let shown = self.profile.shown(signature.when.as_ref(), &self.values);
             return Err(BadFrame::WrongInstrument(format!("{}: {shown} does not hold", signature.text)));
+        }
+        for (index, held) in self.holds.iter_mut().enumerate().filter(|_| all_seen) {
+            let holds = self.profile.fault_holds(index, &self.values);
+            if holds && !*held {
+                self.health.reported(&self.profile.description.fault[index].text);
+            }
+            *held = holds;
         }
         let stops = |index: &usize| self.profile.description.fault[*index].severity == Severity::Stop;
         let fault = self.profile.fault(&self.values).filter(stops);

@@ -1,8 +1,13 @@
 //! What a link counts. Written by the link's thread, read by anyone.
 
 use serde::Serialize;
+use std::collections::BTreeMap;
 use std::sync::atomic::{AtomicU64, Ordering};
-use std::sync::{Mutex, PoisonError};
+use std::sync::{Mutex, MutexGuard, PoisonError};
+
+fn locked<T>(of: &Mutex<T>) -> MutexGuard<'_, T> {
+    of.lock().unwrap_or_else(PoisonError::into_inner)
+}
 
 macro_rules! counters {
     ($($(#[$doc:meta])* $name:ident,)+) => {
@@ -12,6 +17,7 @@ macro_rules! counters {
             $($(#[$doc])* pub $name: AtomicU64,)+
             last_problem: Mutex<String>,
             fault: Mutex<String>,
+            reported: Mutex<BTreeMap<String, u64>>,
         }
 
         /// The counters at one moment.
@@ -22,16 +28,18 @@ macro_rules! counters {
             pub last_problem: String,
             /// The fault that the instrument reports now, in its profile's words; empty for none.
             pub fault: String,
+            /// States of `[[fault]]`, of any severity, that the instrument entered, and how often.
+            pub reported: BTreeMap<String, u64>,
         }
 
         impl Health {
             /// The counters now.
             pub fn report(&self) -> HealthReport {
-                let words = |of: &Mutex<String>| of.lock().unwrap_or_else(PoisonError::into_inner).clone();
                 HealthReport {
                     $($name: self.$name.load(Ordering::Relaxed),)+
-                    last_problem: words(&self.last_problem),
-                    fault: words(&self.fault),
+                    last_problem: locked(&self.last_problem).clone(),
+                    fault: locked(&self.fault).clone(),
+                    reported: locked(&self.reported).clone(),
                 }
             }
         }
@@ -79,11 +87,16 @@ impl Health {
 
     /// Keeps the fault that the instrument reports now; empty for none.
     pub fn fault(&self, text: String) {
-        *self.fault.lock().unwrap_or_else(PoisonError::into_inner) = text;
+        *locked(&self.fault) = text;
+    }
+
+    /// One more time that the instrument entered this state of its profile's `[[fault]]`.
+    pub fn reported(&self, text: &str) {
+        *locked(&self.reported).entry(text.into()).or_default() += 1;
     }
 
     /// Keeps the latest problem in words.
     pub fn problem(&self, text: impl Into<String>) {
-        *self.last_problem.lock().unwrap_or_else(PoisonError::into_inner) = text.into();
+        *locked(&self.last_problem) = text.into();
     }
 }

@@ -398,6 +398,11 @@ impl Profile {
         self.signatures.iter().position(|signature| !signature.holds(values.as_slice()))
     }
 
+    /// Whether a fault holds, by its index into the description.
+    pub fn fault_holds(&self, fault: usize, values: &Values) -> bool {
+        self.faults[fault].holds(values.as_slice())
+    }
+
     /// The gravest fault that holds, by index into the description.
     pub fn fault(&self, values: &Values) -> Option<usize> {
         let grave = |index: &usize| match self.description.fault[*index].severity {
@@ -405,7 +410,7 @@ impl Profile {
             Severity::Degrade => 1,
             Severity::Log => 2,
         };
-        (0..self.faults.len()).filter(|&i| self.faults[i].holds(values.as_slice())).min_by_key(grave)
+        (0..self.faults.len()).filter(|&fault| self.fault_holds(fault, values)).min_by_key(grave)
     }
 }
 

@@ -347,6 +347,14 @@ pub fn folded(text: &str, hang: usize) -> String {
     text.lines().map(fold).collect::<Vec<_>>().join("\n")
 }
 
+/// A word of a command as a shell takes it: in quotes where it needs them.
+pub fn quoted(word: impl std::fmt::Display) -> String {
+    let word = word.to_string();
+    let plain = |c: char| c.is_alphanumeric() || "-_./:=@%+,".contains(c);
+    let as_it_is = !word.is_empty() && word.chars().all(plain);
+    if as_it_is { word } else { format!("'{}'", word.replace('\'', "'\\''")) }
+}
+
 /// Whether a character changes what is read without being seen: a control character, or a mark that turns the
 /// direction of text round, breaks a line, or has no width (but for those that join letters).
 pub fn is_hidden(c: char) -> bool {
@@ -389,6 +397,16 @@ fn colour(text: &str) -> usize {
 #[cfg(test)]
 mod tests {
     use super::*;
+
+    #[test]
+    fn a_shell_gives_back_what_was_quoted() {
+        for word in ["plain", "with space", "it's", "$HOME `x` \"y\" \\", "", "~", "m\u{e4}rz/1.csv"] {
+            let script = format!("printf %s {}", quoted(word));
+            let output = std::process::Command::new("sh").args(["-c", &script]).output();
+            assert_eq!(output.unwrap().stdout, word.as_bytes());
+        }
+        assert_eq!(quoted("runs/first-2.csv"), "runs/first-2.csv");
+    }
 
     #[test]
     fn control_characters_are_shown_and_colours_stay() {

@@ -16,6 +16,7 @@ use crate::ambient::{Answers, LevelsFound};
 use crate::fidelity::Stated;
 use crate::fidelity::dynamics::Dynamics;
 use crate::plan::{Plan, Point, Resolution};
+use crate::print::quoted;
 use crate::run_dir::{Identity, RunDir};
 use crate::sequence::{Event, MeasuredPass, Outcome, PAUSE_MAX_S, Sequence};
 use crate::setup::{Guards, Setup};
@@ -107,8 +108,9 @@ impl Notes {
             miette::ensure!(
                 before == Some(now),
                 help = format!(
-                    "give another --out for another {name}; to go on with this run, leave --{name} away (`muprime runs {shown} \
-                     --note TEXT` notes more)"
+                    "give another --out for another {name}; to go on with this run, leave --{name} away (`muprime runs {} \
+                     --note TEXT` notes more)",
+                    quoted(&shown)
                 ),
                 "{shown} holds passes of a run whose {name} is '{was}', not '{now}'"
             );

@@ -236,8 +236,8 @@ fn save_next(args: &Args, result: &Diagnosis) -> miette::Result<()> {
         match runs::verdict::next_plan(result) {
             Some(plan) => {
                 write_output(out, plan)?;
-                let all: Vec<_> = args.data.iter().map(|data| data.display().to_string()).collect();
-                let (all, plan) = (all.join(" "), out.display());
+                let all: Vec<_> = args.data.iter().map(|data| quoted(data.display())).collect();
+                let (all, plan) = (all.join(" "), quoted(out.display()));
                 say!("next: muprime run {plan} --out NEXT; then muprime diagnose {all} NEXT, both together");
             }
             None => say!("no plan written to {}: no conditions would tell more", out.display()),

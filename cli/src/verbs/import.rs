@@ -138,7 +138,7 @@ pub fn run(args: Args, json: bool) -> miette::Result<ExitCode> {
         }
     }
     log.remarks.iter().for_each(|remark| say!("remark: {remark}"));
-    let (table, folder) = (args.out.join("points.csv"), args.out.display());
+    let (table, folder) = (args.out.join("points.csv"), quoted(args.out.display()));
     say!("{} passes: {}; next: muprime diagnose {folder}", log.passes, table.display());
     exit(DONE)
 }

@@ -29,7 +29,7 @@ pub fn run(args: &Args, json: bool) -> miette::Result<ExitCode> {
     if json {
         answer_json(&json!({ "written": [path, schema] }));
     } else {
-        say!("{} and {}; next: muprime check {}", path.display(), schema.display(), path.display());
+        say!("{} and {}; next: muprime check {}", path.display(), schema.display(), quoted(path.display()));
     }
     exit(DONE)
 }

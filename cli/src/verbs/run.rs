@@ -420,12 +420,18 @@ fn tell(summary: &Summary, json: bool) {
         summary.remedy.iter().for_each(|remedy| report!("  {remedy}"));
     }
     let tripped = matches!(summary.outcome, Outcome::Tripped(_));
-    for (name, link) in summary.links.iter().filter(|_| tripped) {
-        let fault = link["fault"].as_str().filter(|fault| !fault.is_empty());
-        fault.iter().for_each(|fault| report!("`{name}` reports: {fault}"));
+    for (name, link) in &summary.links {
+        let fault = link["fault"].as_str().filter(|fault| tripped && !fault.is_empty()).unwrap_or_default();
+        if !fault.is_empty() {
+            report!("`{name}` reports: {fault}");
+        }
+        let reported = link["reported"].as_object().into_iter().flatten();
+        for (text, times) in reported.filter(|(text, _)| !fault.starts_with(*text)) {
+            report!("`{name}` reported {times} x: {text}");
+        }
     }
     if summary.passes < summary.planned && summary.off.read_back {
-        report!("to resume, repeat the command with --out {}", summary.folder.display());
+        report!("to resume, repeat the command with --out {}", quoted(summary.folder.display()));
     }
     // Passes that render are not compared with the model.
     if rendered.is_none() {
@@ -440,7 +446,7 @@ fn tell(summary: &Summary, json: bool) {
         return;
     }
     if summary.model_departed {
-        report!("next: muprime diagnose {}", summary.folder.display());
+        report!("next: muprime diagnose {}", quoted(summary.folder.display()));
     }
     report!("report: {}", page.display());
 }

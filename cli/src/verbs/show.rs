@@ -31,9 +31,9 @@ pub fn run(args: &Args, json: bool) -> miette::Result<ExitCode> {
             if json {
                 answer_json(&json!({ "table": table }));
             } else if sample == Sample::Foreign {
-                say!("{}; next: muprime import {} -o imported", table.display(), table.display());
+                say!("{}; next: muprime import {} -o imported", table.display(), quoted(table.display()));
             } else {
-                say!("{}; next: muprime diagnose {}", table.display(), folder.display());
+                say!("{}; next: muprime diagnose {}", table.display(), quoted(folder.display()));
             }
         }
         (None, _) if json => all.iter().for_each(|b| answer_json(&json!(b))),

@@ -1,7 +1,6 @@
 //! `muprime submit`: runs what is missing of a study, here or on an engine.
 
 use super::prelude::*;
-use studies::cases::engines::quoted;
 use studies::cases::plan::Pilot;
 use studies::cases::study::Study;
 use studies::cases::submit::{Options, Submitted, cancel, checked, submit, tasks};

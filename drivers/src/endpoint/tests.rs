@@ -270,8 +270,12 @@ fn a_fault_and_a_wrong_instrument_are_shown_with_what_was_read() {
         said.starts_with(&fault.text) && said.contains(fault.when.as_ref()) && said.contains("= 1"),
         "{said}"
     );
-    assert_eq!(sets(&mut endpoint, 3, false), "", "it is gone");
-    let mut other = state(4, false);
+    sets(&mut endpoint, 3, true);
+    assert_eq!(sets(&mut endpoint, 4, false), "", "it is gone");
+    sets(&mut endpoint, 5, true);
+    let reported = endpoint.health().report().reported;
+    assert_eq!(reported.get(&fault.text), Some(&2), "it came twice: {reported:?}");
+    let mut other = state(6, false);
     other[0] = 0;
     let Err(BadFrame::WrongInstrument(why)) = endpoint.frame(frame, &other, Nanos(9)) else { panic!() };
     assert!(why.contains("magic = ") && why.contains("does not hold"), "{why}");

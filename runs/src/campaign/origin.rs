@@ -1,6 +1,7 @@
 //! Where a campaign's plan, setups and tips are, and whether they are still those of its sessions.
 
 use super::{Campaign, FILE, sessions};
+use crate::print::quoted;
 use crate::run_dir::{self, Identity};
 use crate::{files, input};
 use miette::IntoDiagnostic;
@@ -27,7 +28,7 @@ pub(super) fn of_folder(folder: &Path) -> miette::Result<PathBuf> {
         .map_err(|e| miette::miette!("{}: {e}", file.display()))?;
     miette::ensure!(
         origin.folder.is_dir(),
-        help = format!("name the campaign's own file: `muprime run FILE --out {}`", folder.display()),
+        help = format!("name the campaign's own file: `muprime run FILE --out {}`", quoted(folder.display())),
         "{}: the plan and the setups of this campaign were in {}, which is gone",
         folder.display(),
         origin.folder.display()

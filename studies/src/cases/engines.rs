@@ -158,24 +158,3 @@ pub fn numbers(ids: &[String]) -> miette::Result<&[String]> {
         Some(id) => miette::bail!("a job's name is a number, and {id:?} is none"),
     }
 }
-
-/// A word as a shell takes it.
-pub fn quoted(word: &str) -> String {
-    format!("'{}'", word.replace('\'', "'\\''"))
-}
-
-#[cfg(test)]
-mod tests {
-    use super::quoted;
-
-    #[test]
-    fn a_shell_gives_back_what_was_quoted() {
-        for word in ["plain", "with space", "it's", "$HOME `x` \"y\" \\", ""] {
-            let output = std::process::Command::new("sh")
-                .arg("-c")
-                .arg(format!("printf %s {}", quoted(word)))
-                .output();
-            assert_eq!(output.unwrap().stdout, word.as_bytes());
-        }
-    }
-}

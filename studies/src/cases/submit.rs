@@ -14,6 +14,7 @@ use crate::progress;
 use indicatif::ProgressBar;
 use miette::{Context, IntoDiagnostic};
 use rayon::prelude::*;
+use runs::print::quoted;
 use runs::say;
 use runs::session::Unfinished;
 use serde::Serialize;
@@ -148,7 +149,7 @@ pub fn submit(study: &Study, options: &Options) -> miette::Result<Submitted> {
         let ended = by == "local" || by == "dask";
         let goes_on = if ended { "is over" } else { "goes on without this command" };
         say!("{done} of {cases} cases are in {out}; what was at work {goes_on}");
-        let end = format!("; `muprime submit --cancel --out {out}` ends what runs");
+        let end = format!("; `muprime submit --cancel --out {}` ends what runs", quoted(&out));
         say!("the same command goes on from there{}", if ended { "" } else { &end });
     };
     if first_time {

@@ -103,7 +103,7 @@ pub fn tell(claims: &[Claim], made: usize, planned: usize, folder: &Path) {
         say!("{}: {} ({change})", claim.statement, claim.words());
     }
     if made < planned {
-        say!("to make the others, repeat the command: muprime run {}", folder.display());
+        say!("to make the others, repeat the command: muprime run {}", quoted(folder.display()));
     }
     say!("page: {}", folder.join(PAGE).display());
 }

@@ -4,8 +4,9 @@
 //! the site refuses one, what runs goes on and the rest is tried again later, in smaller arrays.
 #![allow(clippy::disallowed_methods, reason = "a refused submission is repeated in wall-clock time")]
 
-use super::{Engine, Handed, Job, numbers, quoted};
+use super::{Engine, Handed, Job, numbers};
 use miette::{Context, IntoDiagnostic, miette};
+use runs::print::quoted;
 use runs::say;
 use std::path::Path;
 use std::process::{Command, Output};
@@ -37,7 +38,7 @@ const PASSING: [&str; 7] = [
 /// The batch script: `ranges.txt` has the ranges of a task in as many lines as the task has cores. They run
 /// side by side. A task that succeeds removes its log.
 fn script(folder: &Path, job: &Job) -> String {
-    let command: Vec<String> = job.command.iter().map(|word| quoted(word)).collect();
+    let command: Vec<String> = job.command.iter().map(quoted).collect();
     format!(
         "#!/bin/sh\n\
          # Runs a task's ranges of cases; handed to sbatch with --array and, for each array, --export=MUPRIME_FIRST=N.\n\
@@ -51,9 +52,9 @@ fn script(folder: &Path, job: &Job) -> String {
          [ $status != 0 ] || rm -f {logs}/\"${{SLURM_ARRAY_JOB_ID}}_$SLURM_ARRAY_TASK_ID.txt\"\n\
          exit $status\n",
         cores = job.cores_a_task,
-        ranges = quoted(&folder.join("ranges.txt").display().to_string()),
+        ranges = quoted(folder.join("ranges.txt").display()),
         command = command.join(" "),
-        logs = quoted(&folder.join("logs").display().to_string()),
+        logs = quoted(folder.join("logs").display()),
     )
 }
 
