@@ -113,6 +113,22 @@ fn answers_are_right_on_three_natures() {
     assert!(decided as f64 >= 0.8 * f64::from(owed as u32), "{decided} of {owed}");
 }
 
+/// Three days of one silicone tip and of one human tip: with a human tip of 0.8 times the lateral stiffness, within its
+/// stated deviation, 'contradicted', and with the nominal one 'supported'. Both were decided by the days of one tip.
+#[test]
+fn days_of_one_tip_do_not_tell_how_kinds_of_tips_differ() {
+    let text = ideal(5, 3).text;
+    let cells: Vec<&str> = text.split("\n[[cell]]\n").collect();
+    let text = [cells[0], cells[1], cells[3]].join("\n[[cell]]\n");
+    let campaign = Campaign::parse("ideal", &text, Path::new(".")).unwrap();
+    let claims = answers(&campaign, "");
+    for name in ["human and artificial", "modulus", "mu_0"] {
+        let claim = claims.iter().find(|claim| claim.name == name).unwrap();
+        assert_eq!((claim.answer, claim.effect), (Answer::Undecided, None), "{claim:?}");
+    }
+    assert_eq!(claims[0].answer, Answer::Supported, "{:?}", claims[0]);
+}
+
 /// What is complete is not made again, a copy of the folder answers the same, another campaign is refused
 /// there, and one session alone decides nothing.
 #[test]

@@ -89,6 +89,7 @@ causes! {
     // Causes of known form that no verdict names: the open set of a diagnosis takes them in.
     open_set {
         charging
+        drag
         frictional_heating
         gain_drift
         lateral_resonance

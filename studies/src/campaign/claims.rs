@@ -12,6 +12,7 @@ use runs::fingertip::FingertipKind;
 use runs::human::number;
 use runs::report::plots::ends;
 use serde::Serialize;
+use std::collections::BTreeMap;
 
 /// What a statement expects of a change, or what was found.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize)]
@@ -161,32 +162,29 @@ fn within(sessions: &[Measured], factor: &Covariate, intermittent: bool) -> Resu
 
 const ONE: &str = "one session alone does not tell how sessions differ";
 
-/// The effect of what differs between sessions, over its range; what else differs is held.
+/// The effect of what differs between cells, over its range; what else differs is held.
 fn across(
     sessions: &[Measured],
     words: &str,
     x: impl Fn(&Measured) -> Option<f64>,
     other: impl Fn(&Measured) -> Option<f64>,
 ) -> Result<(Effect, String), String> {
-    let rows: Vec<[f64; 3]> = sessions
-        .iter()
-        .filter_map(|s| Some([x(s)?.ln(), s.mean_mu()?, other(s).map_or(f64::NAN, f64::ln)]))
-        .collect();
+    let rows = by_cell(sessions, |s| Some([x(s)?.ln(), s.mean_mu()?, other(s).map_or(f64::NAN, f64::ln)]));
     let column = |i: usize| rows.iter().map(|row| row[i]).collect::<Vec<f64>>();
     let (x, y, other) = (column(0), column(1), column(2));
     let [low, high] = ends(&x);
     let factor = (high - low).exp();
     if factor.is_nan() || factor < LEAST_FACTOR {
-        return Err(format!("the sessions' {words} differs by less than a factor of {LEAST_FACTOR}"));
+        return Err(format!("the tips' {words} differs by less than a factor of {LEAST_FACTOR}"));
     }
     let varies = ends(&other);
     let other = (varies[1] - varies[0] > LEAST_FACTOR.ln()).then_some(other.as_slice());
     let effect = Effect::slope(&x, &y, other)
-        .ok_or_else(|| format!("too few sessions, or {words} changes with something else"))?;
+        .ok_or_else(|| format!("too few cells, or {words} changes with something else"))?;
     Ok((effect, format!("{words} over a factor of {}", number(factor))))
 }
 
-/// Least factor by which something must differ between sessions.
+/// Least factor by which something must differ between cells.
 const LEAST_FACTOR: f64 = 1.2;
 
 /// How far measurements lie from a model, in the mean of a session.
@@ -212,20 +210,32 @@ fn beside<M: FrictionModel>(
     Ok((effect, format!("measured less predicted by {words}")))
 }
 
+/// The mean of a cell's sessions, for each cell: days of one tip do not tell how tips differ.
+fn by_cell<const N: usize>(
+    sessions: &[Measured],
+    of: impl Fn(&Measured) -> Option<[f64; N]>,
+) -> Vec<[f64; N]> {
+    let mut cells = BTreeMap::<usize, Vec<[f64; N]>>::new();
+    for s in sessions {
+        cells.entry(s.session.cell).or_default().extend(of(s));
+    }
+    let mean =
+        |rows: &Vec<[f64; N]>| std::array::from_fn(|i| mean(rows.iter().map(|r| r[i])).unwrap_or(f64::NAN));
+    cells.values().filter(|rows| !rows.is_empty()).map(mean).collect()
+}
+
 /// How far human and artificial tips lie apart beside one law.
 fn kinds(sessions: &[Measured]) -> Result<(Effect, String), String> {
     let of = |human: bool| -> Vec<f64> {
-        let own = sessions
-            .iter()
-            .filter(|s| s.kind != FingertipKind::Probe && (s.kind == FingertipKind::Human) == human);
         let departure = |s: &Measured| {
-            let law = EmpiricalPsi::paper(s.finger).ok()?;
+            let own = s.kind != FingertipKind::Probe && (s.kind == FingertipKind::Human) == human;
+            let law = EmpiricalPsi::paper(s.finger).ok().filter(|_| own)?;
             let beside = |d: &Driven| Some(d.mu - law.relative_friction(&d.condition).ok()?.mu_relative);
-            mean(s.driven.iter().filter_map(beside))
+            Some([mean(s.driven.iter().filter_map(beside))?])
         };
-        own.filter_map(departure).collect()
+        by_cell(sessions, departure).concat()
     };
     let effect = Effect::between(&of(true), &of(false))
-        .ok_or_else(|| "two sessions or more of each kind of tip are needed".to_string())?;
+        .ok_or_else(|| "two cells or more of each kind of tip are needed".to_string())?;
     Ok((effect, "human less artificial, beside Eq. 20".to_string()))
 }

@@ -2,7 +2,7 @@
 //!
 //! A session is the unit of evidence: passes of one session share its tip, its day and its mu_0. An effect is
 //! computed in each session by itself, as a difference between the ends of a factor's range at otherwise
-//! equal settings, and its interval is Student's over sessions.
+//! equal settings, and its interval is Student's over sessions; of what differs between cells, over cells.
 
 use models::condition::Condition;
 use models::covariate::{self, Covariate};
@@ -95,7 +95,7 @@ pub struct Effect {
     pub change: f64,
     /// Its 95 % interval.
     pub ci95: [f64; 2],
-    /// Sessions that it rests on.
+    /// Sessions that it rests on; cells where it is of what differs between cells.
     pub sessions: usize,
 }
 
@@ -122,8 +122,8 @@ impl Effect {
         Effect::new(ma - mb, (va + vb).sqrt(), freedom.clamp(1.0, 1e6), 0.0, a.len() + b.len())
     }
 
-    /// Change over the range of `x` by a straight line through one point a session, others of its covariates
-    /// held; `None` with too few sessions, or where `x` and another change together.
+    /// Change over the range of `x` by a straight line through one point a cell, others of its covariates
+    /// held; `None` with too few cells, or where `x` and another change together.
     pub fn slope(x: &[f64], y: &[f64], other: Option<&[f64]>) -> Option<Self> {
         let one: Vec<f64> = vec![1.0; x.len()];
         let centred = |v: &[f64]| without(v, &one);

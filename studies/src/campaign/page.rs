@@ -40,9 +40,9 @@ pub fn page(file: &CampaignFile, made: &[Measured]) -> miette::Result<(String, V
     }
     let _ = write!(w, "<h2>What the paper states, and what this campaign found</h2>{}", answers(&claims));
     w.push_str(&note(
-        "The change of \u{3bc}' with its 95 % interval over sessions. It falls or rises where the whole interval lies beyond the \
-         margin, it does not matter where the whole interval lies within, and else it is undecided: then a change beyond the last \
-         column would have been decided. Statements are those of Vezzoli et al., in words of this page.",
+        "The change of \u{3bc}' with its 95 % interval over sessions, or over cells where cells differ in it (mu_0, modulus, kind \
+         of tip). It falls or rises where the whole interval lies beyond the margin, it does not matter where the whole interval \
+         lies within, and else it is undecided: then a change beyond the last column would have been decided. Statements are those of Vezzoli et al., in words of this page.",
     ));
     w.push_str("<h2>Relative friction by factor</h2>\n<div class=\"panels\">");
     for factor in FACTORS {
@@ -90,8 +90,8 @@ fn methods(file: &CampaignFile, made: &[Measured]) -> String {
         "{} tips and conditions were measured in {} sessions of {} blocks, in random order within a block (seed {}), with {} passes \
          under vibration ({}). The Coulomb friction coefficient of a session is that of its passes without vibration ({low} to {high}). \
          Effects are differences of relative friction between the ends of a factor's range at equal settings of all other factors, \
-         with Student's 95 % intervals over sessions. A statement counts as supported or contradicted where the whole interval lies \
-         on one side of a margin of {}. Software: muprime {}.",
+         with Student's 95 % intervals over sessions, or over tips and conditions where these differ in it. A statement counts as \
+         supported or contradicted where the whole interval lies on one side of a margin of {}. Software: muprime {}.",
         file.cell.len(),
         made.len(),
         file.blocks,
