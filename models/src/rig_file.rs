@@ -5,6 +5,10 @@
 //! it with [`RigFile::to_toml`]; [`CertifiedKey`] is the list of what a certificate can bound.
 
 use crate::finger::Finger;
+use crate::pass::Pass;
+#[cfg(doc)]
+use crate::pass::coulomb_coefficient;
+use crate::quantity::PeakToPeak;
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 use std::collections::BTreeMap;
@@ -154,6 +158,27 @@ pub struct PassNoise {
     pub pass_relative_sd: f64,
     /// Standard deviation of a pass's mean force, each axis, in N, 0 to 100.
     pub force_sd_n: f64,
+}
+
+impl PassNoise {
+    /// Standard uncertainty of a pass's relative friction at a normal force, with `mu_0` and its own uncertainty.
+    pub fn mu_relative_sd(&self, mu_relative: f64, normal_force_n: f64, [mu0, mu0_sd]: [f64; 2]) -> f64 {
+        let force = self.force_sd_n / (mu0 * normal_force_n) * (mu_relative * mu0).hypot(1.0);
+        (mu_relative * self.pass_relative_sd.hypot(mu0_sd / mu0)).hypot(force)
+    }
+
+    /// Standard uncertainty of `mu_0` as [`coulomb_coefficient`] has it from these passes.
+    pub fn coulomb_coefficient_sd<'a>(&self, mu0: f64, passes: impl IntoIterator<Item = &'a Pass>) -> f64 {
+        let still = passes.into_iter().filter(|p| p.amplitude == PeakToPeak::ZERO);
+        let forces = still.filter_map(|p| Some((p.friction_force_n()?, p.normal_force_n)));
+        let (mut variance, mut bottom) = (0.0, 0.0);
+        for (friction, load) in forces {
+            let force = self.force_sd_n * self.force_sd_n * (1.0 + mu0 * mu0);
+            variance += load * load * (force + (self.pass_relative_sd * friction).powi(2));
+            bottom += load * load;
+        }
+        variance.sqrt() / bottom
+    }
 }
 
 impl Default for PassNoise {

@@ -154,12 +154,8 @@ impl Comparator {
         }
 
         let mu_relative = known.map(|m| friction_force_n / (m.value * c.normal_force_n));
-        let measured_sd = self.noise.force_sd_n / coulomb;
-        let mu_relative_sd = known.zip(mu_relative).map(|(m, mu)| {
-            let scatter = self.noise.pass_relative_sd * mu;
-            (measured_sd * measured_sd * (1.0 + mu * mu) + scatter * scatter + (mu * m.sd / m.value).powi(2))
-                .sqrt()
-        });
+        let sd_of = |(m, mu): (Mu0, f64)| self.noise.mu_relative_sd(mu, c.normal_force_n, [m.value, m.sd]);
+        let mu_relative_sd = known.zip(mu_relative).map(sd_of);
         Ok(PassComparison {
             mu_relative,
             mu_relative_sd,

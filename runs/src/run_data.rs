@@ -10,6 +10,7 @@ use crate::sequence::{MeasuredPass, Outcome};
 use crate::session::Summary;
 use models::finger::Finger;
 use models::pass::coulomb_coefficient;
+use models::rig_file::PassNoise;
 use realtime::recorder::{self, Entry};
 use std::collections::BTreeMap;
 use std::path::Path;
@@ -81,26 +82,24 @@ pub fn read(folder: &Path) -> miette::Result<RunData> {
         damage.extend(of_record(&path, reader.integrity().clone()));
     }
     damage.extend(differences(folder, &passes)?);
-    let mu0 = restated(&mut passes);
+    let rig = rig_file(&folder.join("rig.toml"))?;
+    let mu0 = restated(&mut passes, &rig.noise);
     let summary =
         std::fs::read(folder.join("summary.json")).ok().and_then(|b| serde_json::from_slice(&b).ok());
-    let rig = rig_file(&folder.join("rig.toml"))?;
     let mut about = about::of_run(folder, &facts, Some(&rig));
     about.extend(mu0.map(|mu0| ("mu_0", format!("{mu0:.4}, of all passes without vibration"))));
     let fidelity = fidelity::read(folder);
     Ok(RunData { about, facts, files, passes, events, summary, finger: rig.finger, fidelity, damage })
 }
 
-/// Takes the run's own `mu_0` for the measured `mu'` of every pass that has one, and returns it. The standard
-/// uncertainty keeps its share of the value: that of `mu_0` is the larger one of the time of the pass.
-fn restated(passes: &mut [MeasuredPass]) -> Option<f64> {
+/// Takes the run's own `mu_0` for the measured `mu'` of every pass that was compared, and returns it.
+fn restated(passes: &mut [MeasuredPass], noise: &PassNoise) -> Option<f64> {
     let mu0 = coulomb_coefficient(passes.iter().map(|p| &p.pass)).filter(|mu0| *mu0 > 0.0)?;
+    let mu0_sd = noise.coulomb_coefficient_sd(mu0, passes.iter().map(|p| &p.pass));
     for MeasuredPass { pass, comparison, .. } in passes {
         let Some((friction, found)) = pass.friction_force_n().zip(comparison.as_mut()) else { continue };
-        let Some(before) = found.mu_relative else { continue };
         let mu = friction / (mu0 * pass.normal_force_n);
-        let share = if before == 0.0 { 1.0 } else { mu / before };
-        found.mu_relative_sd = found.mu_relative_sd.map(|sd| sd * share);
+        found.mu_relative_sd = Some(noise.mu_relative_sd(mu, pass.normal_force_n, [mu0, mu0_sd]));
         found.mu_relative = Some(mu);
     }
     Some(mu0)
