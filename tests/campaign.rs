@@ -113,8 +113,9 @@ fn answers_are_right_on_three_natures() {
     assert!(decided as f64 >= 0.8 * f64::from(owed as u32), "{decided} of {owed}");
 }
 
-/// Three days of one silicone tip and of one human tip: with a human tip of 0.8 times the lateral stiffness, within its
-/// stated deviation, 'contradicted', and with the nominal one 'supported'. Both were decided by the days of one tip.
+/// Three days of one silicone tip and of one human tip: with a human tip of 0.8 times the lateral
+/// stiffness, within its stated deviation, 'contradicted', and with the nominal one 'supported'. Both were
+/// decided by the days of one tip.
 #[test]
 fn days_of_one_tip_do_not_tell_how_kinds_of_tips_differ() {
     let text = ideal(5, 3).text;

@@ -54,8 +54,9 @@ fn gum_h3_thermometer() {
     assert_eq!(fit.degrees_of_freedom, 9.0);
 }
 
-/// Propagation by draws (JCGM 101:2008) for `mu'` and `mu_0` of three references: the scatter of what 20,000 such runs
-/// measure is what they state. Before, early passes of a run stated up to 42 % more, by the `mu_0` of their time.
+/// Propagation by draws (JCGM 101:2008) for `mu'` and `mu_0` of three references: the scatter of what
+/// 20,000 such runs measure is what they state. Before, early passes of a run stated up to 42 % more, by
+/// the `mu_0` of their time.
 #[test]
 fn stated_uncertainties_of_relative_friction_are_those_of_draws() {
     let noise = PassNoise { pass_relative_sd: 0.015, force_sd_n: 0.0008 };

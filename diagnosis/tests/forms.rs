@@ -141,9 +141,9 @@ fn a_drifting_gain_is_no_offset_of_the_load() {
     assert!(text.contains("gain drift"), "{text}");
 }
 
-/// A force against the sliding beside the contact, 10 mN or 0.15 N s/m (a massless slider in Python, no code of the library;
-/// speed and load are true in every pass): an offset of the load with a wrong speed at 0.94, and 'at least' a friction that
-/// depends on the rate.
+/// A force against the sliding beside the contact, 10 mN or 0.15 N s/m (a massless slider in Python, no
+/// code of the library; speed and load are true in every pass): an offset of the load with a wrong speed at
+/// 0.94, and 'at least' a friction that depends on the rate.
 #[test]
 fn a_drag_beside_the_contact_is_no_cause_of_the_library() {
     for set in ["drag.constant", "drag.viscous"] {

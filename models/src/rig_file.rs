@@ -161,7 +161,8 @@ pub struct PassNoise {
 }
 
 impl PassNoise {
-    /// Standard uncertainty of a pass's relative friction at a normal force, with `mu_0` and its own uncertainty.
+    /// Standard uncertainty of a pass's relative friction at a normal force, with `mu_0` and its own
+    /// uncertainty.
     pub fn mu_relative_sd(&self, mu_relative: f64, normal_force_n: f64, [mu0, mu0_sd]: [f64; 2]) -> f64 {
         let force = self.force_sd_n / (mu0 * normal_force_n) * (mu_relative * mu0).hypot(1.0);
         (mu_relative * self.pass_relative_sd.hypot(mu0_sd / mu0)).hypot(force)
