@@ -170,14 +170,12 @@ fn row_sds(points: &[PhasePoint], model_sd_deg: f64) -> Vec<Option<f64>> {
 }
 
 fn cannot_tell(closed: [bool; 2], chi2: f64, points: usize, sd_estimated: bool) -> Vec<String> {
-    let mut words = Vec::new();
-    for (end, word) in closed.into_iter().zip(["lower", "upper"]) {
-        if !end {
-            words.push(format!(
-                "the {word} end of the modulus: the interval reaches the end of the range searched"
-            ));
-        }
-    }
+    let open = ["lower", "upper"].into_iter().zip(closed).filter(|(_, closed)| !closed);
+    let mut words: Vec<String> = open
+        .map(|(end, _)| {
+            format!("the {end} end of the modulus: the interval reaches the end of the range searched")
+        })
+        .collect();
     if !sd_estimated && chi2 > points as f64 + 3.0 * (2.0 * points as f64).sqrt() {
         words.push(format!(
             "whether the model holds: chi-square is {chi2:.0} for {points} rows, so its interval is too narrow"

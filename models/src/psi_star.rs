@@ -232,10 +232,8 @@ impl Means {
     /// above it positive.
     fn centre(&self, mu0: f64) -> Option<f64> {
         let ends = SEARCH.map(f64::ln);
-        if !(self.score(ends[0], mu0) < 0.0 && self.score(ends[1], mu0) > 0.0) {
-            return None;
-        }
-        Some(crate::root::bisection(ends, 60, |star| self.score(star, mu0) < 0.0))
+        let crosses = self.score(ends[0], mu0) < 0.0 && self.score(ends[1], mu0) > 0.0;
+        crosses.then(|| crate::root::bisection(ends, 60, |star| self.score(star, mu0) < 0.0))
     }
 
     /// Half the slope of the weighted squares in `ln Psi*`.

@@ -11,10 +11,7 @@ pub fn bracketed(mut f: impl FnMut(f64) -> f64, lo: f64, hi: f64) -> f64 {
     if fa == 0.0 {
         return a;
     }
-    if fb == 0.0 {
-        return b;
-    }
-    if (fa > 0.0) == (fb > 0.0) {
+    if fb == 0.0 || (fa > 0.0) == (fb > 0.0) {
         return if fa.abs() <= fb.abs() { a } else { b };
     }
     let tolerance = 4.0 * f64::EPSILON * lo.abs().max(hi.abs());
@@ -59,10 +56,7 @@ pub fn newton(mut f: impl FnMut(f64) -> (f64, f64), lo: f64, hi: f64, start: f64
     if at_lo == 0.0 {
         return lo;
     }
-    if at_hi == 0.0 {
-        return hi;
-    }
-    if (at_lo > 0.0) == (at_hi > 0.0) {
+    if at_hi == 0.0 || (at_lo > 0.0) == (at_hi > 0.0) {
         return if at_lo.abs() <= at_hi.abs() { lo } else { hi };
     }
     let tolerance = 4.0 * f64::EPSILON * lo.abs().max(hi.abs());

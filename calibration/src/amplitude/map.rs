@@ -71,19 +71,17 @@ fn best(
     let depth = (1.0 - lowest).clamp(0.05, 1.0);
     let shortest = (length / 10.0).max(4.0 * length / points.len() as f64);
     let steps = ((20.0 * length / shortest).ln() / 1.05f64.ln()) as i32;
+    let misfit = |b: &[f64; 4]| -> f64 {
+        y.iter().enumerate().map(|(i, y)| (y - model(i, b, &mut [0.0; 4])).powi(2)).sum()
+    };
     let mut starts: Vec<(f64, [f64; 4])> = (0..steps)
         .flat_map(|k| (0..12).map(move |m| (shortest * 1.05f64.powi(k), f64::from(m) / 12.0 - 0.5)))
         .map(|(wavelength, share)| [1.0, middle + 0.5 * wavelength * share, wavelength, depth])
-        .map(|start| (misfit(&model, &y, &start), start))
+        .map(|start| (misfit(&start), start))
         .collect();
     starts.sort_by(|a, b| a.0.total_cmp(&b.0));
     let starts = starts.into_iter().take(8).map(|(_, start)| start);
     nonlinear::best(&model, &y, starts, |f| f.estimates[2] > 0.0)
-}
-
-fn misfit(model: &impl Fn(usize, &[f64], &mut [f64]) -> f64, y: &[f64], b: &[f64; 4]) -> f64 {
-    let mut g = [0.0; 4];
-    y.iter().enumerate().map(|(i, y)| (y - model(i, b, &mut g)).powi(2)).sum()
 }
 
 #[cfg(test)]

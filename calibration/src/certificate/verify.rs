@@ -98,15 +98,14 @@ impl Certificate {
             if !p.value.is_finite() || !p.standard_uncertainty.is_finite() || p.standard_uncertainty < 0.0 {
                 return malformed(format!("parameter `{}` has no finite value and uncertainty", p.name));
             }
-            if !(p.ci95[0] <= p.value && p.value <= p.ci95[1]) {
-                let [low, high] = p.ci95;
+            let [low, high] = p.ci95;
+            if !(low <= p.value && p.value <= high) {
                 return malformed(format!(
                     "the interval of `{}` ({low:e} to {high:e}) does not hold its value {:e}",
                     p.name, p.value
                 ));
             }
-            if p.ci95[0] <= 0.0 && ABOVE_ZERO.split(' ').any(|name| name == p.name) {
-                let [low, high] = p.ci95;
+            if low <= 0.0 && ABOVE_ZERO.split(' ').any(|name| name == p.name) {
                 return malformed(format!(
                     "`{}` is above zero, and its interval ({low:.3e} to {high:.3e}) is not: the data do not determine it",
                     p.name

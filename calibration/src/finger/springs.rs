@@ -96,13 +96,9 @@ pub fn springs(passes: &[Pass], noise: &PassNoise) -> Result<Springs, FingerErro
     // A coarse look at the whole range, then the best three places.
     let [ratios, stiffnesses] = [RATIO_RANGE, STIFFNESS_RANGE_N_PER_M].map(|range| range.map(f64::ln));
     let place = |range: [f64; 2], k: usize, n: usize| range[0] + (range[1] - range[0]) * k as f64 / n as f64;
-    let mut starts: Vec<Found> = Vec::new();
-    for k in 0..=16 {
-        for r in 0..=12 {
-            let at = [place(stiffnesses, k, 16), place(ratios, r, 12), mu0.ln()];
-            starts.push(Found { at, chi2: chi2(&rows, at) });
-        }
-    }
+    let of = |k| (0..=12).map(move |r| [place(stiffnesses, k, 16), place(ratios, r, 12), mu0.ln()]);
+    let looked = (0..=16).flat_map(of).map(|at| Found { at, chi2: chi2(&rows, at) });
+    let mut starts: Vec<Found> = looked.collect();
     starts.sort_by(|a, b| a.chi2.total_cmp(&b.chi2));
     let searched = starts[..3].iter().map(|s| search(&rows, *s, [true; 3]));
     let best = searched.min_by(|a, b| a.chi2.total_cmp(&b.chi2)).unwrap_or(starts[0]);

@@ -9,6 +9,7 @@ use super::{CHI2_95, IdentifyError, Search, apart, check, row_sds};
 use crate::phase::table::PhasePoint;
 use models::quantity::PeakToPeak;
 use models::ridge::phase_curves::{Skin, SkinGrid, retardation_place};
+use models::root::halved;
 use serde::Serialize;
 
 /// One quantity with the other two free.
@@ -196,17 +197,11 @@ pub fn identify_skin(
 }
 
 fn scan(chi2: &impl Fn(Place) -> f64) -> Vec<(Place, f64)> {
-    let share = |n: usize, axis: usize| n as f64 / (SCAN[axis] - 1) as f64;
-    let mut scan = Vec::with_capacity(SCAN.iter().product());
-    for e in 0..SCAN[0] {
-        for k in 0..SCAN[1] {
-            for tau in 0..SCAN[2] {
-                let place = [share(e, 0), share(k, 1), share(tau, 2)];
-                scan.push((place, chi2(place)));
-            }
-        }
-    }
-    scan
+    let place = |n: usize| -> Place {
+        let of = [n / (SCAN[1] * SCAN[2]), n / SCAN[2] % SCAN[1], n % SCAN[2]];
+        std::array::from_fn(|axis| of[axis] as f64 / (SCAN[axis] - 1) as f64)
+    };
+    (0..SCAN.iter().product()).map(place).map(|place| (place, chi2(place))).collect()
 }
 
 /// The lowest places of the scan among those that `wanted` picks, no two of them neighbours.
@@ -269,14 +264,7 @@ fn profile(range: &Range, axis: usize, curve: &[(Place, f64)], best: f64, least:
         let part = x * (curve.len() - 1) as f64 - n as f64;
         curve[n].1 + part * (curve[n + 1].1 - curve[n].1)
     };
-    let crossing = |inside: f64, outside: f64| {
-        let (mut a, mut b) = (inside, outside);
-        for _ in 0..40 {
-            let middle = 0.5 * (a + b);
-            if value_at(middle) <= limit { a = middle } else { b = middle }
-        }
-        a
-    };
+    let crossing = |inside: f64, outside: f64| halved([inside, outside], 40, |x| value_at(x) <= limit)[0];
     let spacing = share(1);
     let low_end = if low > 0.0 { crossing(low, (low - spacing).max(0.0)) } else { 0.0 };
     let high_end = if high < 1.0 { crossing(high, (high + spacing).min(1.0)) } else { 1.0 };

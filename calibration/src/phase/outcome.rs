@@ -34,17 +34,11 @@ pub fn outcome(found: &[(PeakToPeak, RepeatedShift)], at: &Acquisition) -> Outco
     });
     let range = ends(found.iter().map(|(w, _)| w.metres()));
     let largest = found.iter().map(|(_, f)| f.repeat_sd_deg).fold(0.0, f64::max);
-    let mut remarks: Vec<String> = found
-        .iter()
-        .filter(|(_, f)| f.period_doubled > 0)
-        .map(|(w, f)| format!("the period doubled at {w} in {} of {} repeats", f.period_doubled, f.repeats))
-        .collect();
-    remarks.extend(
-        found
-            .iter()
-            .filter(|(_, f)| f.repeats < 10)
-            .map(|(w, f)| format!("{} repeats at {w}; the paper takes 10", f.repeats)),
-    );
+    let doubled = found.iter().filter(|(_, f)| f.period_doubled > 0);
+    let doubled = doubled
+        .map(|(w, f)| format!("the period doubled at {w} in {} of {} repeats", f.period_doubled, f.repeats));
+    let few = found.iter().filter(|(_, f)| f.repeats < 10);
+    let few = few.map(|(w, f)| format!("{} repeats at {w}; the paper takes 10", f.repeats));
     let mut settings = BTreeMap::from([("frequency_hz".to_string(), at.frequency_hz.to_string())]);
     settings.extend(at.condition.iter().map(|c| ("condition".to_string(), c.clone())));
     settings.extend(at.normal_force_n.iter().map(|f| ("normal_force_n".to_string(), f.to_string())));
@@ -52,7 +46,7 @@ pub fn outcome(found: &[(PeakToPeak, RepeatedShift)], at: &Acquisition) -> Outco
         kind: CertificateKind::Phase,
         model: "Phi = 360 |t_pa - t_sa| / T (Eq. 1), mean on the circle over repeats".into(),
         settings,
-        remarks,
+        remarks: doubled.chain(few).collect(),
         parameters: parameters(&findings, &covariance),
         covariance,
         residuals: Residuals {

@@ -59,13 +59,10 @@ pub fn fit(model: &Model, observations: &[f64], start: &[f64]) -> Result<Fit, Fi
             damping *= (1.0 - (2.0 * gain.clamp(0.0, 1.0) - 1.0).powi(3)).max(1.0 / 3.0);
             damping = damping.max(1e-18);
             growth = 2.0;
-            settled = if small {
-                3
-            } else if improved {
-                0
-            } else {
-                settled + 1
-            };
+            settled = if improved { 0 } else { settled + 1 };
+            if small {
+                settled = 3;
+            }
         } else {
             damping *= growth;
             growth *= 2.0;

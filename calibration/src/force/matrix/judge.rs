@@ -119,18 +119,17 @@ pub(super) fn judge(
 
 /// F test of the model against the scatter of readings at one load (and branch, and temperature).
 fn lack_of_fit(fit: &ForceFit, readings: &[LoadReading], channel: Axis) -> Option<f64> {
-    let mut groups: Vec<(usize, Vec<f64>)> = Vec::new();
+    let mut groups: Vec<(&LoadReading, Vec<f64>)> = Vec::new();
     for (i, r) in readings.iter().enumerate() {
         let residual = fit.residuals[i][channel as usize];
-        let same = |&(j, _): &(usize, Vec<f64>)| {
-            let s: &LoadReading = &readings[j];
+        let same = |s: &LoadReading| {
             s.axis == r.axis
                 && (s.load_n - r.load_n).abs() < 1e-9 + 1e-6 * r.load_n.abs()
                 && s.branch == r.branch
         };
-        match groups.iter_mut().find(|g| same(g)) {
+        match groups.iter_mut().find(|(first, _)| same(first)) {
             Some((_, members)) => members.push(residual),
-            None => groups.push((i, vec![residual])),
+            None => groups.push((r, vec![residual])),
         }
     }
     let groups: Vec<Vec<f64>> = groups.into_iter().map(|(_, members)| members).collect();
