@@ -252,10 +252,8 @@ impl Drop for Links {
 pub fn open(setup: &InstrumentsSetup, clock: impl Into<Clock>) -> Result<Rig, OpenError> {
     let mut links = Links::none(clock.into());
     links.clock.hold_for(setup.all().map(|instrument| instrument.address.as_str()));
-    let mut force = Vec::new();
-    for own in &setup.force {
-        force.push(start(&mut links, own, Endpoint::force(own.description()?, own))?);
-    }
+    let one = |own: &InstrumentSetup| start(&mut links, own, Endpoint::force(own.description()?, own));
+    let force = setup.force.iter().map(one).collect::<Result<_, _>>()?;
     let force = ports::compose(force).map_err(|problem| setup.force[0].mismatch(problem))?;
     let own = &setup.amplifier;
     let amplifier = start(&mut links, own, Endpoint::amplifier(own.description()?, own))?;

@@ -94,10 +94,7 @@ impl Session {
 
     /// Tells whoever opened the rig how the first connection went. Returns whether it was the first.
     pub fn tell(&mut self, outcome: Result<(), Ended>) -> bool {
-        self.ready.take().is_some_and(|ready| {
-            let _ = ready.send(outcome);
-            true
-        })
+        self.ready.take().map(|ready| ready.send(outcome)).is_some()
     }
 
     /// Whether the thread is to end.

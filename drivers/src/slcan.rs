@@ -32,13 +32,9 @@ impl Slcan {
     }
 }
 
-fn failed(ended: Ended) -> io::Error {
-    io::Error::other(ended.to_string())
-}
-
 impl CanPort for Slcan {
     fn send(&mut self, frame: &CanFrame) -> io::Result<bool> {
-        self.line.write(&slcan_line(frame)).map(|()| true).map_err(failed)
+        self.line.write(&slcan_line(frame)).map(|()| true).map_err(io::Error::other)
     }
 
     fn receive(&mut self, deadline: Instant) -> io::Result<Option<CanEvent>> {
@@ -47,7 +43,7 @@ impl CanPort for Slcan {
                 return Ok(Some(CanEvent::Frame(frame, Duration::ZERO)));
             }
             let mut buffer = [0; 512];
-            let count = self.line.read(&mut buffer, deadline).map_err(failed)?;
+            let count = self.line.read(&mut buffer, deadline).map_err(io::Error::other)?;
             if count == 0 {
                 return Ok(None);
             }

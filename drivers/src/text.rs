@@ -49,26 +49,21 @@ pub(crate) fn spawn(instrument: &InstrumentSetup, session: Session) -> Result<Jo
             return talk.listen(session, &stream);
         }
         off::at_the_beginning(session, &mut talk)?;
-        talk.begin(session)?;
+        talk.initialise(session)?;
+        talk.read_state(session)?;
         talk.go_on(session, rate_hz)
     })
 }
 
-/// A line that the instrument sends without a request.
-struct Alarm(Pattern);
-
-impl Alarm {
-    /// Where such a line stands in what came, and its length with its end.
-    fn find(&self, came: &[u8], end: &[u8]) -> Option<(usize, usize)> {
-        let head = self.0.head().as_bytes();
-        let begins = (0..came.len().saturating_sub(head.len())).filter(|&at| came[at..].starts_with(head));
-        let whole = |at: usize| {
-            let length = came[at..].windows(end.len()).position(|window| window == end)?;
-            let line = std::str::from_utf8(&came[at..at + length]).ok()?;
-            self.0.read(line).map(|_| (at, length + end.len()))
-        };
-        begins.into_iter().find_map(whole)
-    }
+/// Where a line of this pattern is in what came, and its length with its end.
+fn find(pattern: &Pattern, came: &[u8], end: &[u8]) -> Option<(usize, usize)> {
+    let head = pattern.head().as_bytes();
+    let mut begins = (0..came.len().saturating_sub(head.len())).filter(|&at| came[at..].starts_with(head));
+    begins.find_map(|at| {
+        let length = came[at..].windows(end.len()).position(|window| window == end)?;
+        let line = std::str::from_utf8(&came[at..at + length]).ok()?;
+        pattern.read(line).map(|_| (at, length + end.len()))
+    })
 }
 
 struct Talk {
@@ -80,7 +75,8 @@ struct Talk {
     request: String,
     sent: HashMap<SetId, (String, Instant)>,
     newest: HashMap<SetId, f64>,
-    alarms: Vec<Alarm>,
+    /// Lines that the instrument sends without a request.
+    alarms: Vec<Pattern>,
     bad: u32,
     patience_ms: u32,
 }
@@ -89,8 +85,7 @@ impl Talk {
     fn new(transport: Transport, link: Link) -> Self {
         let patience_ms = link.response_timeout_ms;
         // The profile was read: every alarm is a pattern.
-        let alarms =
-            link.unsolicited.iter().filter_map(|alarm| Pattern::parse(alarm).ok()).map(Alarm).collect();
+        let alarms = link.unsolicited.iter().filter_map(|alarm| Pattern::parse(alarm).ok()).collect();
         Self {
             transport,
             link,
@@ -129,7 +124,7 @@ impl Talk {
     /// Takes whole lines that came unasked out of what came. Returns whether one was an alarm.
     fn unasked(&mut self, session: &mut Session) {
         for alarm in &self.alarms {
-            while let Some((at, length)) = alarm.find(&self.came, self.link.rx_end().as_bytes()) {
+            while let Some((at, length)) = find(alarm, &self.came, self.link.rx_end().as_bytes()) {
                 let line: Vec<u8> = self.came.drain(at..at + length).collect();
                 session.endpoint.alarm(String::from_utf8_lossy(&line).trim());
             }
@@ -226,14 +221,6 @@ impl Talk {
         Ok(())
     }
 
-    fn begin(&mut self, session: &mut Session) -> Result<(), Ended> {
-        self.initialise(session)?;
-        for (frame, query) in queries(session) {
-            self.ask(session, frame, &query)?;
-        }
-        Ok(())
-    }
-
     fn initialise(&mut self, session: &mut Session) -> Result<(), Ended> {
         // A socket is new with every connection: no line is incomplete there.
         if matches!(self.link.kind, LinkKind::Serial | LinkKind::Scpi) {
@@ -309,18 +296,17 @@ impl Talk {
         };
         let bytes = match bytes {
             Ok(bytes) => bytes,
-            Err(by) => return self.bear(session, format!("`{}` was answered by {by}", query.send)),
+            Err(by) => {
+                let problem = format!("`{}` was answered by {by}", query.send);
+                self.note(session, problem.clone());
+                // A few bad answers are borne.
+                return if self.bad >= BAD_IN_A_ROW { Err(Ended::Corrupt(problem)) } else { Ok(()) };
+            }
         };
         self.bad = 0;
         let arrived = session.now();
         session.endpoint.frame(frame, &bytes, arrived)?;
         Ok(())
-    }
-
-    /// Tolerates a few bad answers.
-    fn bear(&mut self, session: &Session, problem: String) -> Result<(), Ended> {
-        self.note(session, problem.clone());
-        if self.bad >= BAD_IN_A_ROW { Err(Ended::Corrupt(problem)) } else { Ok(()) }
     }
 
     fn note(&mut self, session: &Session, problem: String) {

@@ -64,7 +64,13 @@ impl Profile {
             (Some(line), Some(frame)) => frame
                 .read_line(line)
                 .ok_or_else(|| error(format!("`{line}` is not a line of `{}`", frame.name)))?,
-            _ => bytes_of(vector).map_err(error)?,
+            _ => match (&vector.registers, &vector.hex) {
+                (Some(registers), None) => registers.iter().flat_map(|r| r.to_be_bytes()).collect(),
+                (None, Some(hex)) => {
+                    from_hex(hex).ok_or_else(|| error(format!("`{hex}` is not hexadecimal bytes")))?
+                }
+                _ => return Err(error("a vector needs one of `registers`, `hex` and `line`".into())),
+            },
         };
         let mut values = self.values();
         for (name, &given) in &vector.given {
@@ -135,13 +141,5 @@ impl Profile {
         }
         let other = || format!("encoding the values again gives {again:02x?}, not {bytes:02x?}");
         if again == bytes { Ok(()) } else { Err(other()) }
-    }
-}
-
-fn bytes_of(vector: &Vector) -> Result<Vec<u8>, String> {
-    match (&vector.registers, &vector.hex) {
-        (Some(registers), None) => Ok(registers.iter().flat_map(|register| register.to_be_bytes()).collect()),
-        (None, Some(hex)) => from_hex(hex).ok_or_else(|| format!("`{hex}` is not hexadecimal bytes")),
-        _ => Err("a vector needs one of `registers`, `hex` and `line`".into()),
     }
 }

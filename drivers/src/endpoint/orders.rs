@@ -69,10 +69,7 @@ impl Orders {
 
     /// Whether the instrument showed 'off' after an 'off' had been sent.
     fn shown_off(&self) -> bool {
-        match (self.shown, self.off_sent) {
-            (Some((on, arrived)), Some(sent)) => !on && sent < arrived,
-            _ => false,
-        }
+        self.shown.zip(self.off_sent).is_some_and(|((on, arrived), sent)| !on && sent < arrived)
     }
 }
 

@@ -256,7 +256,8 @@ fn place(
         offset: signal.offset,
     };
     let outside = || DbcError::Outside { line, signal: name(), message: message.name.clone() };
-    Some(place).filter(|place| place.fits(length)).ok_or_else(outside)
+    let within = (1..=64).contains(&place.size) && place.bits().all(|bit| bit / 8 < length);
+    within.then_some(place).ok_or_else(outside)
 }
 
 impl DbcMessage {
@@ -280,10 +281,6 @@ impl DbcSignal {
         let start = self.bits().nth((if self.little_endian { first } else { last }).into())?;
         let whole = !self.float && (self.factor, self.offset) == (1.0, 0.0);
         whole.then_some(Self { start: u16::try_from(start).ok()?, size, signed: false, ..*self })
-    }
-
-    fn fits(&self, length: usize) -> bool {
-        (1..=64).contains(&self.size) && self.bits().all(|bit| bit / 8 < length)
     }
 
     /// Places of the bits in the frame, the least significant first: byte times 8 plus bit.

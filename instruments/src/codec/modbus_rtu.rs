@@ -211,19 +211,13 @@ pub fn hear(bytes: &[u8], own: &[u8]) -> Heard {
     let operation = match function {
         1..=4 => Operation::Read { function, address: word(2), count: word(4) },
         6 => Operation::Write { function, address: word(2), registers: vec![word(4)] },
-        15 => {
-            let count = usize::from(word(4));
-            if body[7..].len() != count.div_ceil(8) {
-                return Heard::Noise;
-            }
-            Operation::Write { function, address: word(2), registers: from_bits(&body[7..], count) }
-        }
-        16 => {
-            let data = &body[7..];
-            if data.len() != 2 * usize::from(word(4)) {
-                return Heard::Noise;
-            }
-            let registers = data.chunks_exact(2).map(|pair| u16::from_be_bytes([pair[0], pair[1]])).collect();
+        15 | 16 => {
+            let (data, count) = (&body[7..], usize::from(word(4)));
+            let registers = match function {
+                15 if data.len() == count.div_ceil(8) => from_bits(data, count),
+                16 if data.len() == 2 * count => (0..count).map(|i| word(7 + 2 * i)).collect(),
+                _ => return Heard::Noise,
+            };
             Operation::Write { function, address: word(2), registers }
         }
         _ => Operation::Custom { function, data: body[2] },
