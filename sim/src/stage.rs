@@ -159,8 +159,7 @@ impl Stage {
             self.position_m = self.position_m.clamp(low, high);
             self.velocity_m_s = 0.0;
         }
-        let near = 1e-5;
-        self.at_limit = (self.position_m - low).min(high - self.position_m) < near;
+        self.at_limit = (self.position_m - low).min(high - self.position_m) < 1e-5;
     }
 
     fn press(&mut self, dt: f64) {

@@ -62,15 +62,14 @@ impl ForceSensor for VirtualRig {
 impl Amplifier for VirtualRig {
     fn command(&mut self, command: DriveCommand, now: Nanos) {
         self.world.advance_to(now);
-        if now > command.expires_at() {
-            return;
+        if now <= command.expires_at() {
+            self.world.command_amplifier(AmplifierInput {
+                amplitude: command.amplitude(),
+                frequency_hz: command.frequency_hz(),
+                enable: command.enable(),
+                heartbeat: command.sequence(),
+            });
         }
-        self.world.command_amplifier(AmplifierInput {
-            amplitude: command.amplitude(),
-            frequency_hz: command.frequency_hz(),
-            enable: command.enable(),
-            heartbeat: command.sequence(),
-        });
     }
 
     fn state(&mut self, now: Nanos) -> Result<AmplifierState, NoData> {
@@ -126,13 +125,12 @@ impl SafetyInputs for VirtualRig {
 impl Stage for VirtualRig {
     fn command(&mut self, command: StageCommand, now: Nanos) {
         self.world.advance_to(now);
-        if now > command.expires_at() {
-            return;
+        if now <= command.expires_at() {
+            self.world.command_stage(StageInput {
+                velocity_m_s: command.velocity_m_s(),
+                normal_force_n: command.normal_force_n(),
+            });
         }
-        self.world.command_stage(StageInput {
-            velocity_m_s: command.velocity_m_s(),
-            normal_force_n: command.normal_force_n(),
-        });
     }
 
     fn state(&mut self, now: Nanos) -> Result<StageState, NoData> {

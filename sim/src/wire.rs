@@ -48,11 +48,16 @@ struct Service {
 }
 
 impl Service {
-    /// Begins work that ends soon after the flag is set.
-    fn start(name: &str, work: impl FnOnce(Arc<AtomicBool>) + Send + 'static) -> io::Result<Self> {
+    /// Does `turn` again and again until the flag is set, which it gets for threads of its own.
+    fn start(name: &str, mut turn: impl FnMut(&Arc<AtomicBool>) + Send + 'static) -> io::Result<Self> {
         let stop = Arc::new(AtomicBool::new(false));
         let stopped = Arc::clone(&stop);
-        let thread = std::thread::Builder::new().name(name.into()).spawn(move || work(stopped))?;
+        let work = move || {
+            while !stopped.load(Ordering::Acquire) {
+                turn(&stopped);
+            }
+        };
+        let thread = std::thread::Builder::new().name(name.into()).spawn(work)?;
         Ok(Service { stop, thread: Some(thread) })
     }
 
@@ -95,15 +100,14 @@ impl SharedPlant {
 
     /// The world, brought up to now.
     pub fn now(&self) -> (MutexGuard<'_, dyn Plant + 'static>, Nanos) {
-        // A panic in one emulator must not silence the others: the world itself is still whole.
-        let mut plant = self.plant.lock().unwrap_or_else(std::sync::PoisonError::into_inner);
-        let now = self.clock.now();
+        let (mut plant, now) = self.as_left();
         plant.advance(now);
         (plant, now)
     }
 
     /// The world as it was left, and what time it is: for whoever advances it in steps of his own.
     pub fn as_left(&self) -> (MutexGuard<'_, dyn Plant + 'static>, Nanos) {
+        // A panic in one emulator must not silence the others: the world itself is still whole.
         let plant = self.plant.lock().unwrap_or_else(std::sync::PoisonError::into_inner);
         (plant, self.clock.now())
     }

@@ -6,7 +6,7 @@
 //! argument, so its fixed point is found by bisection where plain repetition is slow.
 
 use super::lateral::Lateral;
-use super::{Contact, HEIGHTS, Motion, Recovery, Steady, element};
+use super::{Contact, HEIGHTS, Motion, Steady, element};
 use std::f64::consts::PI;
 
 /// Steps over the contact phase of a pure sine.
@@ -97,11 +97,7 @@ fn periodic(contact: &Contact, preload_m: f64) -> Pass {
     for _ in 0..34 {
         let middle = 0.5 * (low + high);
         pass = cycle(contact, preload_m, middle);
-        if pass.end_m > middle {
-            low = middle
-        } else {
-            high = middle
-        }
+        (low, high) = if pass.end_m > middle { (middle, high) } else { (low, middle) };
         if high - low <= tolerance {
             break;
         }
@@ -155,10 +151,7 @@ fn cycle(contact: &Contact, preload_m: f64, start_m: f64) -> Pass {
     }
     if !persistent && pure {
         let away = (2.0 * PI - 2.0 * alpha) / omega;
-        spring.stretch_m = match contact.recovery {
-            Recovery::Instant => 0.0,
-            law => law.relax(spring.stretch_m, away),
-        };
+        spring.stretch_m = contact.recovery.relax(spring.stretch_m, away);
     }
     let contact_share = if pure { alpha / PI } else { touching as f64 / steps as f64 };
     Pass { lateral_n: sum / (2.0 * PI), contact: contact_share, end_m: spring.stretch_m }
@@ -167,6 +160,7 @@ fn cycle(contact: &Contact, preload_m: f64, start_m: f64) -> Pass {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::contact::Recovery;
 
     fn paper(v_r: f64) -> f64 {
         let mut contact = Contact::ideal(3.9e6, 1.5e6, 0.5, 0.5, 2.5e-6, 27_500.0, 0.02);

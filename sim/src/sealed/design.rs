@@ -101,11 +101,7 @@ impl Design {
             direction: if noise.chance(0.5) { Direction::Forward } else { Direction::Backward },
             normal_force_n: pick(&self.normal_forces_n, noise),
             position_m: (noise.between(-self.reach_m, self.reach_m) * 1e5).round() * 1e-5,
-            ambient_pressure_pa: if self.pressures_pa.is_empty() {
-                None
-            } else {
-                Some(pick(&self.pressures_pa, noise))
-            },
+            ambient_pressure_pa: (!self.pressures_pa.is_empty()).then(|| pick(&self.pressures_pa, noise)),
             ..Condition::paper()
         }
     }

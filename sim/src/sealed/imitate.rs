@@ -91,10 +91,6 @@ fn lowest(p: &Parameter) -> f64 {
     if matches!(p.draw, Draw::Signed | Draw::Factor) { -1.0 } else { 0.0 }
 }
 
-fn values_of(kind: &DefectKind, x: &Unknowns) -> Values {
-    std::array::from_fn(|i| kind.parameters.get(i).map_or(0.0, |p| value(p, x[NUISANCES + i])))
-}
-
 fn theta(x: &Unknowns) -> Theta {
     std::array::from_fn(|i| x[i])
 }
@@ -291,7 +287,8 @@ impl Case<'_> {
     }
 
     fn run(&self, kind: Kind, x: &Unknowns) -> Vec<f64> {
-        self.predict(&moved(&self.nominal, theta(x)), &Defects::one(kind, values_of(kind, x)))
+        let of = |i| kind.parameters.get(i).map_or(0.0, |p| value(p, x[NUISANCES + i]));
+        self.predict(&moved(&self.nominal, theta(x)), &Defects::one(kind, std::array::from_fn(of)))
     }
 
     /// Derivatives of the model in standard deviations.
@@ -377,19 +374,14 @@ fn bounded_step(kind: &DefectKind, (a, b): &Equations, damping: f64, at: &Unknow
             (m[i][i], r[i]) = (1.0, 0.0);
         }
         let Some(step) = super::oracle::solve(&mut m, r, n) else { return *at };
-        let mut out = false;
-        for i in 0..n {
-            if fixed[i] {
-                continue;
-            }
+        let before = fixed;
+        for i in (0..n).filter(|i| !before[*i]) {
             let (low, high) = bounds(i);
             let wanted = at[i] + step[i];
             next[i] = wanted.clamp(low, high);
-            if wanted != next[i] {
-                (fixed[i], out) = (true, true);
-            }
+            fixed[i] = wanted != next[i];
         }
-        if !out {
+        if fixed == before {
             break;
         }
     }

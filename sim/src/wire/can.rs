@@ -13,7 +13,7 @@ use realtime::ports::Nanos;
 use std::collections::VecDeque;
 use std::io;
 use std::sync::Arc;
-use std::sync::atomic::{AtomicBool, AtomicUsize, Ordering};
+use std::sync::atomic::{AtomicUsize, Ordering};
 use std::time::{Duration, Instant};
 
 /// The far side of a serial CAN adapter: the driver's end speaks to the adapter, this end is the bus.
@@ -89,17 +89,15 @@ impl CanEmulator {
         devices: Vec<CanDevice>,
         plant: SharedPlant,
     ) -> io::Result<Self> {
-        let work = move |stopped: Arc<AtomicBool>| {
-            let instruments = devices.into_iter().map(Instrument::new).collect();
-            let mut bus = Bus { port: Box::new(port), instruments, plant };
-            while !stopped.load(Ordering::Acquire) {
-                if let Err(error) = bus.turn() {
-                    tracing::debug!(%error, "the emulated bus");
-                    std::thread::sleep(Duration::from_millis(5));
-                }
+        let instruments = devices.into_iter().map(Instrument::new).collect();
+        let mut bus = Bus { port: Box::new(port), instruments, plant };
+        let turn = move |_: &_| {
+            if let Err(error) = bus.turn() {
+                tracing::debug!(%error, "the emulated bus");
+                std::thread::sleep(Duration::from_millis(5));
             }
         };
-        Ok(Self { _thread: Service::start("can-emulator", work)? })
+        Ok(Self { _thread: Service::start("can-emulator", turn)? })
     }
 }
 

@@ -155,18 +155,16 @@ fn number_in(question: &str, line: &str) -> Option<usize> {
 
 /// Cuts bytes into lines at either line end.
 #[derive(Default)]
-struct Lines {
-    line: Vec<u8>,
-}
+struct Lines(Vec<u8>);
 
 impl Lines {
     fn push(&mut self, bytes: &[u8], mut whole: impl FnMut(&str)) {
         for &byte in bytes {
             if byte == b'\r' || byte == b'\n' {
-                whole(&String::from_utf8_lossy(&self.line));
-                self.line.clear();
-            } else if self.line.len() < LONGEST_LINE {
-                self.line.push(byte);
+                whole(&String::from_utf8_lossy(&self.0));
+                self.0.clear();
+            } else if self.0.len() < LONGEST_LINE {
+                self.0.push(byte);
             }
         }
     }
@@ -209,25 +207,23 @@ impl TcpLines {
         let address = listener.local_addr()?;
         let instrument = Arc::new(Mutex::new(instrument));
         let clients = Arc::new(AtomicUsize::new(0));
-        let work = move |stopped: Arc<AtomicBool>| {
-            while !stopped.load(Ordering::Acquire) {
-                instrument.lock().unwrap_or_else(PoisonError::into_inner).live();
-                match listener.accept() {
-                    Ok((stream, _)) if clients.load(Ordering::Relaxed) < MOST_CLIENTS => {
-                        let (instrument, stopped) = (Arc::clone(&instrument), Arc::clone(&stopped));
-                        let clients = Arc::clone(&clients);
-                        clients.fetch_add(1, Ordering::Relaxed);
-                        std::thread::spawn(move || {
-                            let _ = serve(stream, &instrument, &stopped);
-                            clients.fetch_sub(1, Ordering::Relaxed);
-                        });
-                    }
-                    Ok(_) => {}
-                    Err(_) => std::thread::sleep(Duration::from_millis(2)),
+        let turn = move |stopped: &Arc<AtomicBool>| {
+            instrument.lock().unwrap_or_else(PoisonError::into_inner).live();
+            match listener.accept() {
+                Ok((stream, _)) if clients.load(Ordering::Relaxed) < MOST_CLIENTS => {
+                    let (instrument, stopped) = (Arc::clone(&instrument), Arc::clone(stopped));
+                    let clients = Arc::clone(&clients);
+                    clients.fetch_add(1, Ordering::Relaxed);
+                    std::thread::spawn(move || {
+                        let _ = serve(stream, &instrument, &stopped);
+                        clients.fetch_sub(1, Ordering::Relaxed);
+                    });
                 }
+                Ok(_) => {}
+                Err(_) => std::thread::sleep(Duration::from_millis(2)),
             }
         };
-        Ok(Self { address, _thread: Service::start("lines", work)? })
+        Ok(Self { address, _thread: Service::start("lines", turn)? })
     }
 
     /// Where it listens.

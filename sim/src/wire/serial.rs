@@ -7,8 +7,6 @@ use instruments::schema::{Stream, Table};
 use realtime::ports::Nanos;
 use std::collections::{BTreeMap, BTreeSet};
 use std::io;
-use std::sync::Arc;
-use std::sync::atomic::{AtomicBool, Ordering};
 use std::time::Duration;
 
 /// The emulator's end of a serial line.
@@ -29,25 +27,23 @@ impl SerialEmulator {
         mut port: Port,
         mut turn: impl FnMut(&[u8]) -> Vec<u8> + Send + 'static,
     ) -> io::Result<Self> {
-        let work = move |stopped: Arc<AtomicBool>| {
-            let _ = port.set_timeout(Duration::from_micros(500));
-            let mut buffer = [0; 1024];
-            while !stopped.load(Ordering::Acquire) {
-                let count = match port.read(&mut buffer) {
-                    Ok(count) => count,
-                    Err(error) if error.kind() == io::ErrorKind::TimedOut => 0,
-                    Err(_) => {
-                        std::thread::sleep(Duration::from_millis(1));
-                        0
-                    }
-                };
-                let answer = turn(&buffer[..count]);
-                if !answer.is_empty() {
-                    let _ = port.write_all(&answer);
+        let _ = port.set_timeout(Duration::from_micros(500));
+        let mut buffer = [0; 1024];
+        let turn = move |_: &_| {
+            let count = match port.read(&mut buffer) {
+                Ok(count) => count,
+                Err(error) if error.kind() == io::ErrorKind::TimedOut => 0,
+                Err(_) => {
+                    std::thread::sleep(Duration::from_millis(1));
+                    0
                 }
+            };
+            let answer = turn(&buffer[..count]);
+            if !answer.is_empty() {
+                let _ = port.write_all(&answer);
             }
         };
-        Ok(Self { _thread: Service::start("serial-emulator", work)? })
+        Ok(Self { _thread: Service::start("serial-emulator", turn)? })
     }
 
     /// Serves Modbus RTU units, each with its stream if its profile has one.

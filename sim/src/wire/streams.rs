@@ -3,11 +3,9 @@
 use super::device::Device;
 use super::serial::frames;
 use super::{Service, SharedPlant};
-use instruments::schema::{LinkKind, Stream};
+use instruments::schema::LinkKind;
 use std::io::{self, Write};
 use std::net::{SocketAddr, TcpListener, TcpStream, UdpSocket};
-use std::sync::Arc;
-use std::sync::atomic::{AtomicBool, Ordering};
 use std::time::Duration;
 
 /// How often what is due is sent.
@@ -34,11 +32,11 @@ impl NetworkStream {
     ///
     /// # Errors
     /// Where the address cannot be bound, or the profile has no stream.
-    pub fn start(address: SocketAddr, device: Device, plant: SharedPlant) -> io::Result<Self> {
+    pub fn start(address: SocketAddr, mut device: Device, plant: SharedPlant) -> io::Result<Self> {
         let link = &device.profile().description.link;
         let stream = device.profile().description.stream.clone();
         let stream = stream.ok_or_else(|| io::Error::other("the profile has no stream"))?;
-        let (sink, address) = if link.kind == LinkKind::Udp {
+        let (mut sink, address) = if link.kind == LinkKind::Udp {
             let socket = UdpSocket::bind(address)?;
             socket.set_nonblocking(true)?;
             let address = socket.local_addr()?;
@@ -50,8 +48,13 @@ impl NetworkStream {
             let address = listener.local_addr()?;
             (Sink::Tcp(listener, Vec::new()), address)
         };
-        let work = move |stopped: Arc<AtomicBool>| serve(sink, device, &stream, &plant, &stopped);
-        Ok(Self { address, _thread: Service::start("stream-emulator", work)? })
+        let mut due = plant.now().1;
+        let turn = move |_: &_| {
+            let sent = frames(&mut device, &stream, &plant, &mut due);
+            sink.serve(&sent, &device);
+            std::thread::sleep(TURN);
+        };
+        Ok(Self { address, _thread: Service::start("stream-emulator", turn)? })
     }
 
     /// Where it is.
@@ -60,11 +63,10 @@ impl NetworkStream {
     }
 }
 
-fn serve(mut sink: Sink, mut device: Device, stream: &Stream, plant: &SharedPlant, stopped: &AtomicBool) {
-    let mut due = plant.now().1;
-    while !stopped.load(Ordering::Acquire) {
-        let sent = frames(&mut device, stream, plant, &mut due);
-        match &mut sink {
+impl Sink {
+    /// Sends frames to whoever is there.
+    fn serve(&mut self, sent: &[Vec<u8>], device: &Device) {
+        match self {
             Sink::Tcp(listener, clients) => {
                 if let (Ok((client, _)), true) = (listener.accept(), clients.len() < MOST_CLIENTS) {
                     // One that does not read is disconnected, not waited for.
@@ -86,6 +88,5 @@ fn serve(mut sink: Sink, mut device: Device, stream: &Stream, plant: &SharedPlan
                 }
             }
         }
-        std::thread::sleep(TURN);
     }
 }

@@ -6,8 +6,7 @@ use instruments::FrameId;
 use instruments::profile::FrameKind;
 use std::io;
 use std::path::{Path, PathBuf};
-use std::sync::Arc;
-use std::sync::atomic::{AtomicBool, AtomicU32, Ordering};
+use std::sync::atomic::{AtomicU32, Ordering};
 use std::time::Duration;
 
 /// How often the attributes are written anew.
@@ -31,15 +30,13 @@ impl SysfsFolder {
         std::fs::create_dir(&path)?;
         write(&mut device, &plant, &path)?;
         let folder = path.clone();
-        let work = move |stopped: Arc<AtomicBool>| {
-            while !stopped.load(Ordering::Acquire) {
-                if let Err(error) = write(&mut device, &plant, &folder) {
-                    tracing::debug!(%error, "the emulated attributes");
-                }
-                std::thread::sleep(TURN);
+        let turn = move |_: &_| {
+            if let Err(error) = write(&mut device, &plant, &folder) {
+                tracing::debug!(%error, "the emulated attributes");
             }
+            std::thread::sleep(TURN);
         };
-        Ok(Self { path, thread: Service::start("sysfs-emulator", work)? })
+        Ok(Self { path, thread: Service::start("sysfs-emulator", turn)? })
     }
 
     /// The folder.
