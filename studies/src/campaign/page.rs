@@ -231,14 +231,13 @@ fn collapse(file: &CampaignFile, made: &[Measured]) -> miette::Result<String> {
 fn session_table(file: &CampaignFile, made: &[Measured]) -> String {
     let row = |session: runs::campaign::Session| {
         let done = made.iter().find(|s| s.session.number == session.number);
-        let (state, mu0, passes) = match done {
-            None => ("to be made", String::new(), String::new()),
-            Some(s) => ("complete", s.mu0.map_or("unknown".into(), number), s.driven.len().to_string()),
-        };
-        let (folder, cell) = (session.folder.display().to_string(), &file.cell[session.cell]);
-        let link = match done {
-            None => escape(&folder),
-            Some(_) => format!("<a href=\"{0}/report.html\">{0}</a>", escape(&folder)),
+        let (folder, cell) = (escape(&session.folder.display().to_string()), &file.cell[session.cell]);
+        let (state, mu0, passes, link) = match done {
+            None => ("to be made", String::new(), String::new(), folder),
+            Some(s) => {
+                let link = format!("<a href=\"{folder}/report.html\">{folder}</a>");
+                ("complete", s.mu0.map_or("unknown".into(), number), s.driven.len().to_string(), link)
+            }
         };
         format!(
             "<tr><td class=\"n\">{}</td><td class=\"n\">{}</td><td>{}</td><td>{}</td><td>{link}</td><td>{state}</td>\

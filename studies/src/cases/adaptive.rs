@@ -33,11 +33,6 @@ pub struct SparseGrid {
     pub nodes: Vec<Node>,
 }
 
-/// The step above.
-fn parent((level, index): Step) -> Option<Step> {
-    (level > 1).then(|| (level - 1, if (index / 2).is_multiple_of(2) { index / 2 + 1 } else { index / 2 }))
-}
-
 impl SparseGrid {
     /// Without nodes.
     pub fn new(dimensions: usize) -> Self {
@@ -115,9 +110,11 @@ fn add(steps: &[Step], there: &mut HashSet<Vec<Step>>, new: &mut Vec<Vec<Step>>)
         return;
     }
     for axis in 0..steps.len() {
-        if let Some(above) = parent(steps[axis]) {
+        let (level, index) = steps[axis];
+        if level > 1 {
             let mut ancestor = steps.to_vec();
-            ancestor[axis] = above;
+            // The odd one of the two indices about half of this one.
+            ancestor[axis] = (level - 1, (index / 2) | 1);
             add(&ancestor, there, new);
         }
     }

@@ -163,15 +163,12 @@ fn merged(
         failed += u64::from(entry.outcome.is_err());
         writer.push(entry)?;
         let mut ended = Ok(());
-        open.retain_mut(|(_, reader)| match reader.peek() {
-            None => false,
-            Some(Ok(_)) => true,
-            Some(Err(_)) => {
-                if let Some(Err(why)) = reader.next() {
-                    ended = Err(why);
-                }
-                false
+        open.retain_mut(|(_, reader)| {
+            if let Some(Err(why)) = reader.next_if(Result::is_err) {
+                ended = Err(why);
+                return false;
             }
+            reader.peek().is_some()
         });
         ended?;
     }

@@ -195,10 +195,10 @@ impl Reader {
     /// A file that cannot be read, that is no whole Parquet file, or that holds other columns.
     pub fn open(kind: &'static CaseKind, path: &Path) -> miette::Result<Reader> {
         let shown = path.display().to_string();
-        let file = File::open(path).into_diagnostic().wrap_err_with(|| shown.clone())?;
-        let builder = ParquetRecordBatchReaderBuilder::try_new(file)
-            .into_diagnostic()
-            .wrap_err_with(|| shown.clone())?;
+        let named = || shown.clone();
+        let file = File::open(path).into_diagnostic().wrap_err_with(named)?;
+        let builder =
+            ParquetRecordBatchReaderBuilder::try_new(file).into_diagnostic().wrap_err_with(named)?;
         let file = builder.metadata().file_metadata();
         let (rows, values) = (file.num_rows(), file.key_value_metadata().cloned().unwrap_or_default());
         let fact = |kv: KeyValue| Some((kv.key.strip_prefix("muprime.")?.to_string(), kv.value?));
@@ -210,8 +210,7 @@ impl Reader {
         {
             miette::bail!("{shown}: no results of the kind {} as this version has them", kind.name);
         }
-        let batches =
-            builder.with_batch_size(ROWS).build().into_diagnostic().wrap_err_with(|| shown.clone())?;
+        let batches = builder.with_batch_size(ROWS).build().into_diagnostic().wrap_err_with(named)?;
         Ok(Reader { facts, rows: rows.max(0) as u64, kind, batches, ready: Vec::new().into_iter(), shown })
     }
 }

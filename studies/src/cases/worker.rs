@@ -69,15 +69,13 @@ pub fn work(study: &Study, range: Range<u64>, program: &str, job: Option<&Path>)
 
 /// Whether the shard at a range's place is that of its cases. One that cannot be read is set aside, with a word.
 fn stands(study: &Study, range: &Range<u64>, place: &Path) -> miette::Result<bool> {
-    let reader = match Reader::open(study.kind, place) {
-        Ok(reader) if reader.rows == range.end - range.start => reader,
-        Ok(_) | Err(_) => {
-            let mut aside = place.as_os_str().to_owned();
-            aside.push(".damaged");
-            say!("{}: no whole shard; it is set aside as .damaged, and its cases are run", place.display());
-            fs::rename(place, aside).into_diagnostic().wrap_err_with(|| place.display().to_string())?;
-            return Ok(false);
-        }
+    let reader = Reader::open(study.kind, place).ok();
+    let Some(reader) = reader.filter(|reader| reader.rows == range.end - range.start) else {
+        let mut aside = place.as_os_str().to_owned();
+        aside.push(".damaged");
+        say!("{}: no whole shard; it is set aside as .damaged, and its cases are run", place.display());
+        fs::rename(place, aside).into_diagnostic().wrap_err_with(|| place.display().to_string())?;
+        return Ok(false);
     };
     let mut keys = Sha256::new();
     for key in study.keys(range.clone())? {

@@ -63,11 +63,11 @@ pub fn collapse(study: Study, out: &Path) -> miette::Result<Reproduced> {
     let found = study.whole(out)?;
     let all: Vec<Plotted> = found.iter().map(|(point, run)| Plotted::of(point, run, reading)).collect();
     let drawn: Vec<&Plotted> = all.iter().filter(|p| p.is_drawn()).collect();
-    let mut series: Vec<Series> = Vec::new();
-    for panel in Panel::ALL {
-        let marks = drawn.iter().filter(|p| p.panel == panel).map(|p| (p.psi, p.mu_relative));
-        series.push(Series::marks(panel.variable(), marks.collect()));
-    }
+    let marks = |panel: Panel| {
+        let shown = drawn.iter().filter(|p| p.panel == panel && p.psi <= 12.0);
+        Series::marks(panel.variable(), shown.map(|p| (p.psi, p.mu_relative)).collect())
+    };
+    let mut series: Vec<Series> = Panel::ALL.into_iter().map(marks).collect();
     // The base curve is in every panel: it counts once.
     let counted =
         |p: &&&Plotted| p.panel == Panel::Frequency || p.panel.set(base, p.panel.values()[p.value]) != base;
@@ -80,7 +80,6 @@ pub fn collapse(study: Study, out: &Path) -> miette::Result<Reproduced> {
     let curve = |star: f64| {
         (0..=200).map(|k| 0.06 * f64::from(k)).map(move |p| (p, relative_friction(PsiEq17(p), star)))
     };
-    series.iter_mut().for_each(|s| s.points.retain(|p| p.0 <= 12.0));
     let law = |name: String, star: f64, sd: f64| {
         let within = curve(star - sd).zip(curve(star + sd));
         let band = within.map(|((psi, a), (_, b))| (psi, a.min(b), a.max(b))).collect();

@@ -418,11 +418,8 @@ fn calibration<'a>(name: &'static str, sets: impl Iterator<Item = &'a Scored>) -
     let mut list: Vec<(f64, f64)> =
         sets.map(|s| (s.top_probability, f64::from(u8::from(s.top_right)))).collect();
     list.sort_by(|a, b| a.0.total_cmp(&b.0));
-    if list.len() < 50 {
-        return Figure { name, value: None, ci95: None, n: list.len(), target: "<= 0.05" };
-    }
     let mut error = 0.0;
-    for bin in list.chunks(list.len().div_ceil(10)) {
+    for bin in list.chunks(list.len().div_ceil(10).max(1)) {
         let n = bin.len() as f64;
         let stated = bin.iter().map(|b| b.0).sum::<f64>() / n;
         let right = bin.iter().map(|b| b.1).sum::<f64>() / n;
@@ -430,7 +427,8 @@ fn calibration<'a>(name: &'static str, sets: impl Iterator<Item = &'a Scored>) -
         let bias = right * (1.0 - right) / (n - 1.0).max(1.0);
         error += n / list.len() as f64 * ((stated - right).powi(2) - bias).max(0.0).sqrt();
     }
-    Figure { name, value: Some(error), ci95: None, n: list.len(), target: "<= 0.05" }
+    let value = (list.len() >= 50).then_some(error);
+    Figure { name, value, ci95: None, n: list.len(), target: "<= 0.05" }
 }
 
 /// Truth by answer, counted.

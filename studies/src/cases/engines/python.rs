@@ -11,7 +11,7 @@ use std::process::{Command, Stdio};
 /// HyperQueue.
 pub const HYPERQUEUE: Engine = Engine { name: "hq", submit, again, alive, cancel };
 /// Dask.distributed.
-pub const DASK: Engine = Engine { name: "dask", submit, again: gone, alive, cancel };
+pub const DASK: Engine = Engine { name: "dask", submit, again: |_, job| Ok(Handed::of(job)), alive, cancel };
 
 /// What speaks to them.
 const SCRIPT: &str = include_str!("hand_over.py");
@@ -23,10 +23,6 @@ fn submit(folder: &Path, job: &Job) -> miette::Result<Handed> {
 
 fn again(folder: &Path, job: &Job) -> miette::Result<Handed> {
     begun(folder, job, numbers(&job.ids)?)
-}
-
-fn gone(_: &Path, job: &Job) -> miette::Result<Handed> {
-    Ok(Handed::of(job))
 }
 
 /// Starts the script; its first line names the job, or what is wrong.

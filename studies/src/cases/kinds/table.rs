@@ -28,9 +28,7 @@ pub const HELD_OUT: usize = 200;
 /// The nodes, and after them those that are held out.
 pub fn points() -> Vec<GridPoint> {
     let grid = Grid::SHIPPED;
-    let mut points = grid.points();
-    points.extend(grid.held_out(HELD_OUT));
-    points
+    [grid.points(), grid.held_out(HELD_OUT)].concat()
 }
 
 fn prepare(header: &Header, _: &std::path::Path) -> miette::Result<super::Make> {

@@ -146,13 +146,6 @@ impl Scene {
         self.strikes.iter().filter_map(fault).collect()
     }
 
-    fn tampers(&self) -> Option<(Tamper, Nanos)> {
-        self.strikes.iter().find_map(|s| match ROWS[s.row].what {
-            What::Shown(tamper) => Some((tamper, time_of(s.at))),
-            _ => None,
-        })
-    }
-
     fn limits(&self) -> Limits {
         let mut limits = Limits::paper(T);
         limits.timing = self.pace.timing(T, RING);
@@ -238,7 +231,7 @@ impl Scene {
     fn hands(&self, cycle: u64, world: &SharedRig) {
         for strike in self.strikes.iter().filter(|s| s.at == cycle) {
             let mut rig = world.rig();
-            let mut operator = rig.world.operator;
+            let operator = &mut rig.world.operator;
             match ROWS[strike.row].what {
                 What::DeadMan => operator.holds_dead_man_from = None,
                 What::EmergencyStop => operator.presses_emergency_stop = true,
@@ -246,7 +239,6 @@ impl Scene {
                 What::RelayFalls => rig.world.amplifier.cut_supply(),
                 _ => {}
             }
-            rig.world.operator = operator;
         }
     }
 
@@ -284,7 +276,10 @@ pub fn run_with(scene: &Scene, keep: bool, core: Core) -> Found {
     let deaf = core == Core::Deaf;
     let faults = if deaf { Vec::new() } else { scene.faults() };
     let shown = Arc::new(AtomicU64::new(0));
-    let tamper = scene.tampers().filter(|_| !deaf);
+    let tamper = scene.strikes.iter().find_map(|s| match ROWS[s.row].what {
+        What::Shown(tamper) if !deaf => Some((tamper, time_of(s.at))),
+        _ => None,
+    });
     let tampered = |inner| Tampered::new(inner, tamper, &shown);
     let holds_dead_man_from = Some(time_of(20));
     world.rig().world.operator = Operator { holds_dead_man_from, ..Operator::default() };
@@ -296,7 +291,7 @@ pub fn run_with(scene: &Scene, keep: bool, core: Core) -> Found {
     );
     let ports = Ports { supply: Box::new(supply), contacts: Box::new(contacts), ..ports };
     let mut controller = VirtualLoop::new(config, Arc::clone(&model) as Arc<dyn FrictionModel>, ports);
-    let mut watch = Watch::new(scene);
+    let mut watch = Watch { shown: vec![None; scene.strikes.len()], ..Watch::default() };
     let mut rows = Vec::new();
     let mut request = Request::default();
     let rogue = scene.first(|w| w == What::RogueMaster);
@@ -307,9 +302,7 @@ pub fn run_with(scene: &Scene, keep: bool, core: Core) -> Found {
     let mut paused = 0;
     for cycle in 1..=scene.length() {
         let mut lateness = scene.lateness(cycle);
-        if let Some((at, ms)) = pause
-            && cycle == at
-        {
+        if let Some((_, ms)) = pause.filter(|(at, _)| *at == cycle) {
             // The controller stands still; the rig's time goes on.
             for i in 0..ms {
                 let mut rig = world.rig();
@@ -394,10 +387,6 @@ struct Watch {
 }
 
 impl Watch {
-    fn new(scene: &Scene) -> Self {
-        Watch { shown: vec![None; scene.strikes.len()], ..Watch::default() }
-    }
-
     /// The plate while the controller stands still.
     fn alone(&mut self, ms: u64, amplitude: f64) {
         if ms == 0 {
@@ -442,11 +431,9 @@ impl Watch {
         if row.mu_relative.is_ok_and(|mu| !mu.value.is_finite()) {
             self.wrong.push(format!("mu' is not a number in cycle {cycle}"));
         }
-        let at = shown_ns / T.0 - if paused > 0 { paused.min(shown_ns / T.0) } else { 0 };
-        for shown in &mut self.shown {
-            if shown.is_none() && shown_ns > 0 {
-                *shown = Some(at);
-            }
+        let at = (shown_ns / T.0).saturating_sub(paused);
+        for shown in self.shown.iter_mut().filter(|_| shown_ns > 0) {
+            *shown = shown.or(Some(at));
         }
         if cycle > STEADY_AT && row.remark.is_some() {
             self.remark_at = self.remark_at.or(Some(cycle));
