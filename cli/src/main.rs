@@ -268,14 +268,16 @@ fn usage_error(error: &clap::Error) -> serde_json::Value {
     let text = cli::plain(&error.to_string());
     let joined = |part: &str| part.split_whitespace().collect::<Vec<_>>().join(" ");
     let mut parts = text.split("\n\n");
-    let (what, help) = if error.kind() == ErrorKind::DisplayHelpOnMissingArgumentOrSubcommand {
-        ("the command is incomplete".to_string(), "add `--help`: it lists what is missing".to_string())
+    let incomplete = error.kind() == ErrorKind::DisplayHelpOnMissingArgumentOrSubcommand;
+    let first = if incomplete {
+        "the command is incomplete".into()
     } else {
-        let first = joined(parts.next().unwrap_or_default());
-        let helps = parts.map(joined).filter(|part| !part.starts_with("For more information"));
-        let what = first.strip_prefix("error: ").unwrap_or(&first).to_string();
-        (what, helps.collect::<Vec<_>>().join("; "))
+        joined(parts.next().unwrap_or_default())
     };
+    let helps = parts.map(joined).filter(|part| !incomplete && !part.starts_with("For more information"));
+    let helps = helps.collect::<Vec<_>>().join("; ");
+    let help = if helps.is_empty() { "add `--help`: it lists what is possible" } else { &helps };
+    let what = first.strip_prefix("error: ").unwrap_or(&first);
     json!({ "error": what, "causes": [], "help": help, "status": cli::REFUSED })
 }
 
@@ -324,6 +326,7 @@ mod tests {
             ),
             ("muprime check", "required arguments were not provided: <FILES>", "Usage: muprime check"),
             ("muprime model", "the command is incomplete", "--help"),
+            ("muprime run --seed 1e3", "invalid value '1e3'", "--help"),
         ] {
             let document = document(line);
             assert!(document["error"].as_str().unwrap().contains(error), "{line}: {document}");

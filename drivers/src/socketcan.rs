@@ -47,11 +47,7 @@ impl CanPort for KernelCan {
         };
         let frame = id.and_then(|id| CanDataFrame::new(id, frame.data()));
         let frame = frame.ok_or_else(|| io::Error::other("no CAN frame can be like that"))?;
-        match self.socket.write_frame(&frame) {
-            // A queue without room is back-pressure, no error (python-can issue 2004).
-            Err(error) if matches!(error.raw_os_error(), Some(libc::ENOBUFS | libc::EAGAIN)) => Ok(false),
-            written => written.map(|()| true),
-        }
+        sent(self.socket.write_frame(&frame))
     }
 
     fn receive(&mut self, deadline: Instant) -> io::Result<Option<CanEvent>> {
@@ -77,6 +73,15 @@ impl CanPort for KernelCan {
                 Err(error) => return Err(error),
             }
         }
+    }
+}
+
+/// Whether a frame was taken: a queue without room is back-pressure, no error (python-can issue 2004).
+fn sent(written: io::Result<()>) -> io::Result<bool> {
+    match written {
+        Ok(()) => Ok(true),
+        Err(error) if matches!(error.raw_os_error(), Some(libc::ENOBUFS | libc::EAGAIN)) => Ok(false),
+        Err(error) => Err(error),
     }
 }
 
