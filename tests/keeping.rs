@@ -565,6 +565,16 @@ fn no_output_takes_the_place_of_a_file_of_another_kind() {
             assert_eq!(output.status.code(), Some(0), "{words:?}: {}", texts(&output).1);
         }
     }
+    // A pipe stays one, a link too, and what it leads to is the new export.
+    let (pipe, link) = (folder.path().join("pipe"), folder.path().join("link"));
+    assert!(Command::new("mkfifo").arg(&pipe).status().unwrap().success());
+    refused(&["export", run, "--to", "mcap", "--out", pipe.to_str().unwrap()], "a pipe or a device");
+    assert!(!pipe.metadata().unwrap().is_file() && !folder.path().join("pipe.new").exists());
+    std::fs::write(folder.path().join("earlier"), "").unwrap();
+    std::os::unix::fs::symlink("earlier", &link).unwrap();
+    let output = muprime().args(["export", run, "--to", "mcap", "--out"]).arg(&link).output().unwrap();
+    assert_eq!(output.status.code(), Some(0), "{}", texts(&output).1);
+    assert!(link.is_symlink() && folder.path().join("earlier").metadata().unwrap().len() > 0);
     // Of a record that is cut, the export holds fewer passes than the run, and says so.
     std::fs::write(&record, &before[..before.len() / 2]).unwrap();
     let output = muprime().args(["--json", "export", run, "--to", "mcap"]).output().unwrap();

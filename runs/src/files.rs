@@ -58,29 +58,41 @@ pub fn sync_folder_of(path: &Path) -> io::Result<()> {
 /// # Errors
 /// A link that another user has put there.
 pub fn write_whole(path: &Path, bytes: impl AsRef<[u8]>) -> miette::Result<()> {
-    let written = named(path).and_then(|path| {
-        if fs::metadata(&path).is_ok_and(|there| !there.is_file() && !there.is_dir()) {
-            return fs::write(path, bytes.as_ref());
-        }
-        put(&path, bytes.as_ref())
+    let written = named(path).and_then(|(path, special)| match special {
+        true => fs::write(path, bytes.as_ref()).into_diagnostic(),
+        false => put(&path, |mut file| file.write_all(bytes.as_ref()).into_diagnostic()),
     });
-    written.into_diagnostic().wrap_err_with(|| format!("cannot write {}", path.display()))
+    written.wrap_err_with(|| format!("cannot write {}", path.display()))
+}
+
+/// The same of a file that `write` makes piece by piece, and flushes.
+///
+/// # Errors
+/// Those of `write`; a link that another user has put there; a pipe or a device: nothing is beside it.
+pub fn write_in_pieces<T>(path: &Path, write: impl FnOnce(File) -> miette::Result<T>) -> miette::Result<T> {
+    let written = named(path).and_then(|(path, special)| match special {
+        true => Err(miette::miette!(help = "give the name of a file", "a pipe or a device is there")),
+        false => put(&path, write),
+    });
+    written.wrap_err_with(|| format!("cannot write {}", path.display()))
 }
 
 /// Writes a file of a run's or a study's folder, to which others may write, in the same way; a link that
 /// stands there is replaced, and what it leads to is not touched.
 pub fn write_plain(path: &Path, bytes: impl AsRef<[u8]>) -> miette::Result<()> {
-    put(path, bytes.as_ref()).into_diagnostic().wrap_err_with(|| format!("cannot write {}", path.display()))
+    let written = put(path, |mut file| file.write_all(bytes.as_ref()).into_diagnostic());
+    written.wrap_err_with(|| format!("cannot write {}", path.display()))
 }
 
-/// What a path leads to, through links of this user and of root.
-fn named(path: &Path) -> io::Result<PathBuf> {
+/// What a path leads to, through links of this user and of root, and whether a pipe or a device is there.
+fn named(path: &Path) -> miette::Result<(PathBuf, bool)> {
     let link = fs::symlink_metadata(path)
         .is_ok_and(|there| there.is_symlink() && there.uid() != 0 && !is_own(&there));
     if link {
-        return Err(io::Error::other("another user has put a link there"));
+        miette::bail!("another user has put a link there");
     }
-    Ok(fs::canonicalize(path).unwrap_or_else(|_| path.to_path_buf()))
+    let special = fs::metadata(path).is_ok_and(|there| !there.is_file() && !there.is_dir());
+    Ok((fs::canonicalize(path).unwrap_or_else(|_| path.to_path_buf()), special))
 }
 
 /// Whether a file is this user's.
@@ -88,17 +100,18 @@ pub fn is_own(file: &fs::Metadata) -> bool {
     fs::metadata("/proc/self").is_ok_and(|own| own.uid() == file.uid())
 }
 
-fn put(path: &Path, bytes: &[u8]) -> io::Result<()> {
+fn put<T>(path: &Path, write: impl FnOnce(File) -> miette::Result<T>) -> miette::Result<T> {
     let part = beside(path);
-    let moved = fresh(&part)
-        .and_then(|mut file| file.write_all(bytes).and_then(|()| file.sync_all()).map(|()| file))
-        .and_then(|file| Placed { file, path: part.clone() }.still_there().map_err(io::Error::other))
-        .and_then(|()| fs::rename(&part, path));
-    if let Err(why) = moved {
+    let moved = fresh(&part).into_diagnostic().and_then(|file| {
+        let made = write(file.try_clone().into_diagnostic()?)?;
+        file.sync_all().into_diagnostic()?;
+        Placed { file, path: part.clone() }.still_there()?;
+        fs::rename(&part, path).into_diagnostic().map(|()| made)
+    });
+    if moved.is_err() {
         let _ = fs::remove_file(&part);
-        return Err(why);
     }
-    sync_folder_of(path)
+    moved.and_then(|made| sync_folder_of(path).into_diagnostic().map(|()| made))
 }
 
 /// Makes a folder with all that lead to it, their names safe. Returns those that were not there, the outermost first.
@@ -237,8 +250,20 @@ mod tests {
         let mut names: Vec<_> = fs::read_dir(&folder).unwrap().map(|e| e.unwrap().file_name()).collect();
         names.sort();
         assert_eq!(names, ["link", "report.html", "taken"]);
-        write_whole(Path::new("/dev/null"), b"a device stays one").unwrap();
-        assert!(!fs::metadata("/dev/null").unwrap().is_file());
+        write_in_pieces(&link, |mut file| file.write_all(b"third").into_diagnostic()).unwrap();
+        assert_eq!(fs::read(&path).unwrap(), b"third");
+        assert!(fs::symlink_metadata(&link).unwrap().is_symlink());
+        let pipe = folder.join("pipe");
+        assert!(std::process::Command::new("mkfifo").arg(&pipe).status().unwrap().success());
+        let why = write_in_pieces(&pipe, |_| Ok(())).unwrap_err();
+        assert!(format!("{why:?}").contains("a pipe or a device is there"), "{why:?}");
+        let reader = {
+            let pipe = pipe.clone();
+            std::thread::spawn(move || fs::read(pipe).unwrap())
+        };
+        write_whole(&pipe, b"a pipe stays one").unwrap();
+        assert_eq!(reader.join().unwrap(), b"a pipe stays one");
+        assert!(!fs::metadata(&pipe).unwrap().is_file());
         fs::remove_dir_all(folder).unwrap();
     }
 

@@ -15,7 +15,9 @@ pub struct Args {
 /// Recovers; refused: a file that is not there, or that holds nothing of a record; the record of a live
 /// run. Nothing is written then.
 pub fn run(args: Args, json: bool) -> miette::Result<ExitCode> {
-    let file = &args.file;
+    // The record itself, not a link to it, is replaced, and its own folder has the lock.
+    let leads_to = args.file.is_symlink().then(|| fs::canonicalize(&args.file)).and_then(Result::ok);
+    let file = &leads_to.unwrap_or(args.file);
     let shown = || file.display().to_string();
     super::there(file, "recording")?;
     if !fs::metadata(file).into_diagnostic().wrap_err_with(shown)?.is_file() {

@@ -6,7 +6,8 @@ use super::plan::length;
 use super::run::Entry;
 use super::shard::{Facts, Reader, Writer};
 use super::study::Study;
-use miette::{Context, IntoDiagnostic};
+use miette::IntoDiagnostic;
+use runs::files::{GATHERED, replaceable, write_in_pieces};
 use serde::Serialize;
 use sha2::{Digest, Sha256};
 use std::collections::BTreeSet;
@@ -75,7 +76,7 @@ pub fn holes(there: &[Range<u64>], cases: u64) -> Vec<Range<u64>> {
 /// `any_build`), a shard that is damaged, a disk that is full, another file at that place: no file is
 /// written then.
 pub fn gather(study: &Study, to: &Path, any_build: bool) -> miette::Result<Gathered> {
-    runs::files::replaceable(to, runs::files::GATHERED)?;
+    replaceable(to, GATHERED)?;
     let there = study.ranges_there()?;
     let cases = study.file.header.cases;
     let holes = holes(&there, cases);
@@ -93,18 +94,8 @@ pub fn gather(study: &Study, to: &Path, any_build: bool) -> miette::Result<Gathe
     if let Some(beyond) = there.iter().find(|r| r.end > cases) {
         miette::bail!("{}: the study has {cases} cases only", study.shard(beyond).display());
     }
-    let part = runs::files::beside(to);
-    let file = runs::files::fresh(&part).into_diagnostic().wrap_err_with(|| part.display().to_string())?;
-    let written = merged(study, &there, BufWriter::new(file), any_build);
-    let moved = written.and_then(|gathered| {
-        std::fs::rename(&part, to).into_diagnostic().wrap_err_with(|| to.display().to_string())?;
-        runs::files::sync_folder_of(to).into_diagnostic()?;
-        Ok(Gathered { file: to.to_path_buf(), ..gathered })
-    });
-    if moved.is_err() {
-        let _ = std::fs::remove_file(&part);
-    }
-    moved
+    let gathered = write_in_pieces(to, |file| merged(study, &there, BufWriter::new(file), any_build))?;
+    Ok(Gathered { file: to.to_path_buf(), ..gathered })
 }
 
 fn merged(
@@ -174,7 +165,6 @@ fn merged(
     }
     let Hashed(mut to, hash) = writer.end(&facts(study)?)?;
     to.flush().into_diagnostic()?;
-    to.get_ref().sync_all().into_diagnostic()?;
     Ok(Gathered {
         file: PathBuf::new(),
         sha256: hex(&hash.finalize()),

@@ -12,7 +12,7 @@ use mcap::{Attachment, Compression, WriteOptions, Writer};
 use miette::{Context, IntoDiagnostic};
 use realtime::recorder::{EVENTS, Entry, HEADER, PASSES, Reader};
 use realtime::turn::Row;
-use runs::files::{FLAT_MCAP, beside, fresh, replaceable, sync_folder_of};
+use runs::files::{FLAT_MCAP, replaceable, write_in_pieces};
 use runs::run_data::RunData;
 use runs::run_dir::records_in;
 use runs::sequence::MeasuredPass;
@@ -26,29 +26,19 @@ use std::path::Path;
 /// Returns how many passes they hold.
 ///
 /// # Errors
-/// Whatever the file system or the format's library says; another file is at that place. Nothing is left
-/// behind then.
+/// Whatever the file system or the format's library says; another file, a pipe or a device is at that place.
+/// Nothing is left behind then.
 pub fn write(folder: &Path, run: &RunData, facts: &Facts, to: &Path) -> miette::Result<usize> {
     replaceable(to, FLAT_MCAP)?;
-    let part = beside(to);
-    let written = fresh(&part).into_diagnostic().and_then(|file| {
+    write_in_pieces(to, |file| {
         let mut flat = Flat::begin(BufWriter::new(file), run, facts).into_diagnostic()?;
         for path in records_in(folder)? {
             let file = File::open(&path).into_diagnostic()?;
             flat.record(BufReader::new(file)).wrap_err_with(|| path.display().to_string())?;
         }
         let passes = flat.points.len();
-        let mut file = flat.end().into_diagnostic()?;
-        file.flush().into_diagnostic()?;
-        file.get_ref().sync_all().into_diagnostic().map(|()| passes)
-    });
-    let placed = written.and_then(|passes| {
-        std::fs::rename(&part, to).and_then(|()| sync_folder_of(to)).into_diagnostic().map(|()| passes)
-    });
-    if placed.is_err() {
-        let _ = std::fs::remove_file(&part);
-    }
-    placed.wrap_err_with(|| format!("cannot write {}", to.display()))
+        flat.end().into_diagnostic()?.flush().into_diagnostic().map(|()| passes)
+    })
 }
 
 /// The file that is being written.
