@@ -364,6 +364,14 @@ fn all_problems_are_told_at_once() {
     let (_, said) = checked(&[], &made.at("setup.toml"));
     assert_eq!(said["problems"].as_array().unwrap().len(), 8, "{said}");
     assert_eq!(lines(&said).len(), 8, "{said}");
+    // The keys of [estimate] have defaults, each by itself.
+    let (head, estimate) = good.split_once("[estimate]\n").unwrap();
+    let rest = estimate.split_once("\n[").map(|(_, rest)| format!("[{rest}")).unwrap_or_default();
+    for key in ["window = 40", "normal_force_min_n = 0.05", "sample_sd_n = 0.001"] {
+        std::fs::write(made.at("estimate.toml"), format!("{head}[estimate]\n{key}\n{rest}")).unwrap();
+        let (code, said) = checked(&[], &made.at("estimate.toml"));
+        assert_eq!(code, Some(0), "{key}: {said}");
+    }
     // A key that is misspelt or of another type keeps nothing back: the values are judged with it, all in one answer.
     let both = good
         .replace("rate_hz = 1000", "rate_hz = 1000\nspin_us = -4")

@@ -207,7 +207,8 @@ fn set_row(d: &Description, set: &crate::schema::Set) -> Vec<String> {
         match (set.object, named) {
             (Some((index, sub)), _) => format!("object {index:04X}sub{sub}"),
             (None, Some(write)) => {
-                format!("{} register {}", spaced(&write.table), write.address + set.register)
+                let kind = set.number.map_or(String::new(), |number| format!(" {number:?}").to_lowercase());
+                format!("{} register {}{kind}", spaced(&write.table), write.address + set.register)
             }
             (None, None) => String::new(),
         }

@@ -18,6 +18,7 @@
 //! | [`vector`] | golden vectors: bytes beside the values they stand for |
 //! | [`traffic`] | the share of a line that samples take |
 //! | [`document`] | a profile as a page for people |
+//! | [`units`] | names of units, in profiles and in foreign tables, with their factors to SI |
 //! | [`error`] | what is wrong with a profile, where, and what to do |
 //!
 //! ```
@@ -67,6 +68,7 @@ pub mod field;
 pub mod profile;
 pub mod schema;
 pub mod traffic;
+pub mod units;
 pub mod vector;
 
 pub use error::ProfileError;

@@ -70,6 +70,9 @@ fn units_and_factors_agree() {
         (FORCE, "name = \"lateral\"", "unit = \"N\"", "unit = \"mN\"", "1e-3 N"),
         (FORCE, "name = \"lateral\"", newton, "factor = 1.0, unit = \"mN\"", "prefix"),
         (FORCE, "name = \"lateral\"", "unit = \"N\"", "unit = \"g\"", "9.80665e-3 N"),
+        (FORCE, "name = \"lateral\"", "unit = \"N\"", "unit = \"lbf\"", "1 lbf is 4.44822"),
+        (FORCE, "name = \"lateral\"", "unit = \"N\"", "unit = \"kgf\"", "1 kgf is 9.80665"),
+        (FORCE, "name = \"lateral\"", "unit = \"N\"", "unit = \"gf\"", "9.80665e-3 N"),
         (FORCE, "name = \"lateral\"", newton, "factor = nan, unit = \"N\"", "not finite"),
         (AMPLIFIER, drive, nano, "factor = 1e-6, unit = \"m\"", "1e-9 m"),
         (AMPLIFIER, drive, nano, "factor = 1.0, unit = \"Hz\"", "unit = \"m\""),
@@ -80,10 +83,27 @@ fn units_and_factors_agree() {
         (STAGE, "[[signal]]\nname = \"position\"", nano, "factor = 1e-3, unit = \"m\"", "1e-9 m"),
         (CAN, "name = \"lateral\"", "factor = 1e-3", "factor = 1.0", "1e-3 N"),
     ]);
+    // What people round: 4.448 N in a pound.
+    let pounds = "unit = \"lbf\"\nsi = { factor = 4.448, unit = \"N\" }";
+    assert_eq!(
+        said(FORCE, "name = \"lateral\"", "unit = \"N\"\nsi = { factor = 1.0, unit = \"N\" }", pounds),
+        ""
+    );
     // The DBC file states a unit of its own.
     let whole = CAN.replace("\"mN\"", "\"N\"").replace("factor = 1e-3", "factor = 1.0");
     let why = said(&whole, "[profile]", "[profile]", "[profile]");
     assert!(why.contains("1 mN is 1e-3 N"), "{why}");
+}
+
+/// Two numbers do not share a byte, and an answer takes time.
+#[test]
+fn numbers_do_not_overlap_and_time_limits_are_above_zero() {
+    each_is_refused(&[
+        (FORCE, "name = \"normal\"", "register = 8", "register = 7", "`normal` and `lateral` share bytes"),
+        (FORCE, "name = \"normal\"", "register = 8", "register = 6", "`normal` and `lateral` share bytes"),
+        (FORCE, "[link]", "response_timeout_ms = 50", "response_timeout_ms = 0", "`response_timeout_ms`"),
+        (FORCE, "[link]", "connect_timeout_ms = 1000", "connect_timeout_ms = 0", "`connect_timeout_ms`"),
+    ]);
 }
 
 /// The bits of a float are no counts, for a certificate of force over them is wrong and looks good. Its

@@ -201,6 +201,9 @@ fn a_resolution_is_stated_or_known_or_unknown() {
     };
     assert_eq!(lsb(RTU, "fx", DBC), 0.01, "a count of a whole number");
     let float = RTU.replacen("register = 0\ntype = \"i16\"", "register = 0\ntype = \"f32\"", 1);
+    // What shares its bytes is a part of them.
+    let float =
+        float.replacen("register = 1\ntype = \"i16\"", "register = 1\ntype = \"i16\"\nbits = [0, 16]", 1);
     assert!(lsb(&float, "fx", DBC).is_nan());
     let stated = float.replacen("type = \"f32\"", "type = \"f32\"\nresolution_si = 1e-4", 1);
     assert_eq!(lsb(&stated, "fx", DBC), 1e-4);
@@ -227,7 +230,7 @@ fn scattered_registers_are_read_in_as_few_reads_as_may_be() {
     assert_eq!(spans(&joined), [(0, 6)]);
     let third = |address: u32, number: &str| {
         format!(
-            "{joined}\n[[signal]]\nname = \"third\"\nframe = \"sample\"\naddress = {address}\ntype = \"{number}\"\n"
+            "{joined}\n[[signal]]\nname = \"third\"\nframe = \"sample\"\naddress = {address}\ntype = \"{number}\"\nbits = [0, 16]\n"
         )
     };
     assert_eq!(spans(&third(1, "u16")), [(0, 6)], "within another");

@@ -1,6 +1,7 @@
 //! Quantities on the command line: `2um`, `27.5kHz`, `20mm/s`, `500mN`, or the bare number in SI.
 
 use instruments::profile::power_of_ten;
+use instruments::units::moved;
 
 /// The text with a point, where it has one decimal comma.
 pub(crate) fn with_point(text: &str) -> Option<String> {
@@ -19,15 +20,7 @@ pub fn parse(text: &str, unit: &str) -> Result<f64, String> {
     let split = |at: usize| {
         let (number, written) = text.split_at(at);
         // In decimal digits, so that 2um is the very number that 2e-6 is.
-        let number = number.trim();
-        let power = power_of_ten(written.trim(), unit)?;
-        number.parse::<f64>().ok()?;
-        match number.to_ascii_lowercase().split_once('e') {
-            None => format!("{number}e{power}").parse().ok(),
-            Some((digits, e)) => {
-                format!("{digits}e{}", e.parse::<i32>().ok()?.checked_add(power)?).parse().ok()
-            }
-        }
+        moved(number, power_of_ten(written.trim(), unit)?)
     };
     text.char_indices().skip(1).find_map(|(at, _)| split(at)).ok_or_else(|| {
         if let Some(pointed) = with_point(text).filter(|pointed| parse(pointed, unit).is_ok()) {

@@ -1,7 +1,7 @@
 //! A profile tried before any instrument is: its vectors, then its own emulator's answers read for a second.
 
 use drivers::library::Source;
-use instruments::profile::{FrameKind, Refusal};
+use instruments::profile::FrameKind;
 use instruments::schema::Severity;
 use instruments::traffic::LineSetup;
 use instruments::{FrameId, Profile};
@@ -17,7 +17,24 @@ pub fn of(path: &Path) -> Result<(), String> {
     let profile =
         Source::read(path).and_then(|source| source.profile()).map_err(|error| error.to_string())?;
     line(&profile)?;
+    vectors(&profile)?;
     second(profile)
+}
+
+/// Whether a vector tries every force: a zero shows no byte order, equal forces no axes.
+fn vectors(profile: &Profile) -> Result<(), String> {
+    let d = &profile.description;
+    let forces = d.signal.iter().filter(|signal| signal.si.unit == "N");
+    let forces: Vec<&String> = forces.map(|signal| signal.name.as_ref()).collect();
+    let tried = |name: &String| {
+        d.vector.iter().map(|vector| vector.expect.as_ref()).any(|expect| {
+            let own = expect.get(name).filter(|own| **own != 0.0);
+            own.is_some() && forces.iter().filter(|force| expect.get(**force) == own).count() == 1
+        })
+    };
+    forces.iter().find(|name| !tried(name)).map_or(Ok(()), |name| {
+        Err(format!("no [[vector]] expects a force of `{name}` that is neither zero nor another signal's"))
+    })
 }
 
 /// Whether the samples fit the line.
@@ -37,6 +54,7 @@ fn second(profile: Profile) -> Result<(), String> {
     let world = World::new(&WorldConfig::ideal(), 1).map_err(|error| error.to_string())?;
     let mut plant = WorldPlant::new(world);
     let mut values = profile.values();
+    let mut valid = vec![false; profile.description.signal.len()];
     let frames: Vec<FrameId> = (0..profile.frames().len()).map(FrameId).collect();
     let rates: Vec<Option<f64>> = frames.iter().map(|&frame| rate_hz(&profile, frame)).collect();
     for ms in 0..1000_u32 {
@@ -50,6 +68,7 @@ fn second(profile: Profile) -> Result<(), String> {
             let name = &profile.frames()[frame.0].name;
             let bytes = device.frame(frame, &mut plant, now);
             profile.decode(frame, &bytes, &mut values).map_err(|error| format!("`{name}`: {error}"))?;
+            profile.signals().for_each(|(_, id)| valid[id.0] |= profile.refusal(id, &values).is_none());
             let shape = &profile.frames()[frame.0];
             // What the world does not know yet, such as a set-point that nobody has sent, is not a number of
             // a line.
@@ -87,14 +106,9 @@ fn second(profile: Profile) -> Result<(), String> {
             fault.text
         ));
     }
-    let unread = |name: &&String| {
-        let signal = profile.signal(name);
-        signal.is_some_and(|signal| profile.refusal(signal, &values) == Some(Refusal::NotANumber))
-    };
-    match profile.description.emulator.measure.keys().find(unread) {
-        Some(name) => Err(format!("signal `{name}` is not a number in the emulator's own frames")),
-        None => Ok(()),
-    }
+    let never = |name: &&String| profile.signal(name).is_some_and(|signal| !valid[signal.0]);
+    let why = |name| format!("signal `{name}` has no valid sample in the emulator's own frames");
+    d.emulator.measure.keys().find(never).map_or(Ok(()), |name| Err(why(name)))
 }
 
 /// How often a frame comes; `None` for once.
@@ -116,7 +130,8 @@ mod tests {
     fn every_bundled_profile_stands_its_rehearsal() {
         for id in drivers::bundled::ids() {
             let profile = drivers::profile(id).unwrap();
-            line(&profile).and_then(|()| second(profile)).unwrap_or_else(|problem| panic!("{id}: {problem}"));
+            let all = line(&profile).and_then(|()| vectors(&profile)).and_then(|()| second(profile));
+            all.unwrap_or_else(|problem| panic!("{id}: {problem}"));
         }
     }
 
@@ -127,6 +142,20 @@ mod tests {
         profile.description.emulator.constant.insert("fault".into(), 1.0);
         let message = second(profile).unwrap_err();
         assert!(message.contains("`fault == 1`") && message.contains("[emulator.constant]"), "{message}");
+    }
+
+    #[test]
+    fn a_force_that_no_vector_tries_and_one_that_is_never_valid_are_refused() {
+        let text = drivers::bundled::text("muprime-force2").unwrap();
+        let refusal = |changed: &str| {
+            let profile = Profile::checked(changed, &|_| None).unwrap();
+            vectors(&profile).and_then(|()| second(profile)).err().unwrap_or_default()
+        };
+        let untried = refusal(&text.replace("lateral = -0.5, ", "").replace("lateral = 20.0, ", ""));
+        assert!(untried.contains("a force of `lateral`"), "{untried}");
+        let never =
+            refusal(&text.replace("fault == 0\"\ntext = \"force into", "fault == 3\"\ntext = \"force into"));
+        assert!(never.contains("signal `normal` has no valid sample"), "{never}");
     }
 
     #[test]

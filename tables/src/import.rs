@@ -20,7 +20,6 @@ pub(crate) mod remarks;
 mod series;
 pub mod targets;
 mod text;
-mod units;
 mod values;
 #[cfg(feature = "excel")]
 mod workbook;
@@ -29,6 +28,7 @@ mod write;
 use calibration::certificate::sha256_hex;
 use map::Map;
 use models::pass::Pass;
+use models::rig_file::RigFile;
 use series::Spread;
 use targets::Id;
 use values::{Dropped, Values};
@@ -40,7 +40,7 @@ pub(crate) use grid::csv_of;
 pub use log::{Log, MappedColumn};
 pub use map::guessed_lines;
 pub(crate) use remarks::points;
-pub use remarks::{Range, of_table as remarks_of};
+pub use remarks::{Range, never_lifts, of_table as remarks_of};
 pub use series::{Counts, Cut};
 pub use text::Marks;
 
@@ -117,6 +117,7 @@ pub fn import(source: &str, bytes: &[u8], grid: &Grid, wanted: &Wanted<'_>) -> m
         Some(text) => (text.clone(), Vec::new()),
         None => write::rig(&passes, source, wanted.tip)?,
     };
+    let slack = RigFile::parse(&rig).ok().and_then(|rig| never_lifts(&passes, &rig.finger));
     let log = Log {
         schema: "muprime.import/1",
         version: env!("CARGO_PKG_VERSION"),
@@ -133,7 +134,8 @@ pub fn import(source: &str, bytes: &[u8], grid: &Grid, wanted: &Wanted<'_>) -> m
         passes: passes.len(),
         series,
         ranges: remarks::ranges(&passes, &columns),
-        remarks: [map::contradicted(map, grid), remarks::remarks(&passes, &columns)].concat(),
+        remarks: [map::contradicted(map, grid), remarks::remarks(&passes, &columns), Vec::from_iter(slack)]
+            .concat(),
         dropped,
     };
     Ok(Imported { table, rig, log })

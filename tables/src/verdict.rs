@@ -1,6 +1,6 @@
 //! From a table and the rig.toml beside it to a verdict, its page, and the files in a run's folder.
 
-use crate::import::{points, remarks_of};
+use crate::import::{never_lifts, points, remarks_of};
 use crate::law::Loaded;
 use crate::passes::parse_passes;
 use calibration::certificate::sha256_hex;
@@ -84,6 +84,7 @@ impl Subject {
         };
         result.report.remarks.extend(lack.map(unused));
         result.report.remarks.extend(remarks_of(&self.passes));
+        result.report.remarks.extend(never_lifts(&self.passes, &self.rig.finger));
         Ok(result)
     }
 
@@ -141,11 +142,19 @@ mod tests {
         let rig = "[finger]\nnormal_stiffness_n_per_m = 3.9e6\nlateral_stiffness_n_per_m = 1.5e6\n\
                    stiffness_relative_sd = 0.05\npoisson_ratio = 0.33\n\
                    [noise]\npass_relative_sd = 0.02\nforce_sd_n = 0.001\n";
-        let passes: Vec<Pass> = (0..24).map(pass).collect();
-        let subject = Subject::of(passes, b"", RigFile::parse(rig).unwrap()).unwrap();
+        let mut passes: Vec<Pass> = (0..24).map(pass).collect();
+        let subject = Subject::of(passes.clone(), b"", RigFile::parse(rig).unwrap()).unwrap();
         let options = Options { pairs: false, ..Options::default() };
-        let remarks = subject.diagnose(options, None).unwrap().report.remarks.join("\n");
+        let remarks = subject.diagnose(options.clone(), None).unwrap().report.remarks.join("\n");
         assert!(remarks.contains("lateral_force_n is empty: point 7 (1 of 24 passes)"), "{remarks}");
         assert!(remarks.contains("speed_m_s: 20000 mm/s is a thousand times too large"), "{remarks}");
+        assert!(!remarks.contains("loses contact"), "{remarks}");
+        for pass in &mut passes {
+            (pass.speed_m_s, pass.normal_force_n) = (0.02, 1000.0 * pass.normal_force_n);
+            pass.lateral_force_n = pass.lateral_force_n.map(|force| 1000.0 * force);
+        }
+        let subject = Subject::of(passes, b"", RigFile::parse(rig).unwrap()).unwrap();
+        let remarks = subject.diagnose(options, None).unwrap().report.remarks.join("\n");
+        assert!(remarks.contains("no vibration loses contact") && remarks.contains("mN"), "{remarks}");
     }
 }

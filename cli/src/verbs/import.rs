@@ -116,6 +116,9 @@ pub fn run(args: Args, json: bool) -> miette::Result<ExitCode> {
         let [low, median, high] = range.low_median_high.map(|value| number(value * factor));
         say!("  {words:<22} {}, median {median}", format!("{low} to {high} {unit}").trim_end());
     }
+    if !log.not_taken.is_empty() {
+        say!("columns that are not taken: {}", log.not_taken.join(", "));
+    }
     log.notes.iter().for_each(|note| say!("note: {note}"));
     log.assumed.iter().for_each(|what| say!("assumed in rig.toml: {what}"));
     if let Some(series) = &log.series {

@@ -1,6 +1,7 @@
 //! Answers that are lines of text.
 
 use super::pattern::Pattern;
+use crate::units::{moved, power_of};
 
 /// Decimals of a number whose pattern states none, where a line is written.
 const DECIMALS: u8 = 9;
@@ -55,33 +56,18 @@ pub fn number(line: &str) -> Option<f64> {
     }
 }
 
-/// SI prefixes as instruments of text write them, the largest first, none among them; the two other signs for
-/// micro are the micro sign and the Greek letter.
-pub(crate) const PREFIXES: [(&str, f64); 9] = [
-    ("G", 1e9),
-    ("M", 1e6),
-    ("k", 1e3),
-    ("", 1.0),
-    ("m", 1e-3),
-    ("u", 1e-6),
-    ("\u{b5}", 1e-6),
-    ("\u{3bc}", 1e-6),
-    ("n", 1e-9),
-];
+/// SI prefixes as instruments of text write them, the largest first, none among them.
+const PREFIXES: [(&str, f64); 7] =
+    [("G", 1e9), ("M", 1e6), ("k", 1e3), ("", 1.0), ("m", 1e-3), ("u", 1e-6), ("n", 1e-9)];
 
 /// The value in `unit` that a line such as `5mm/s/V` (0.005 m/s/V) or `8.16 us` stands for: a number, perhaps
 /// a space, an SI prefix or none, the unit. `None` for anything else, and for numbers that are not finite.
 pub fn quantity(line: &str, unit: &str) -> Option<f64> {
     let rest = line.trim().strip_suffix(unit)?;
-    let (number, factor) = PREFIXES
-        .iter()
-        .filter(|(prefix, _)| !prefix.is_empty())
-        .find_map(|(prefix, factor)| rest.strip_suffix(prefix).map(|number| (number, *factor)))
-        .unwrap_or((rest, 1.0));
-    // A decimal number is all that may be left: Rust would read `inf` and `1e3` as well.
-    let number = number.trim_end();
-    let plain = number.chars().all(|c| c.is_ascii_digit() || matches!(c, '.' | '-' | '+'));
-    number.parse().ok().filter(|value: &f64| plain && value.is_finite()).map(|value| value * factor)
+    let (number, prefix) = rest.split_at(rest.trim_end_matches(char::is_alphabetic).len());
+    // A decimal number is all that may be left: no `inf`, and no `1e3`.
+    let number = Some(number.trim_end()).filter(|number| !number.contains(['e', 'E']))?;
+    moved(number, power_of(prefix)?)
 }
 
 /// The line that stands for a value in `unit`, with the prefix that leaves one to three digits before the point.

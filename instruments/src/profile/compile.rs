@@ -49,6 +49,17 @@ impl Compiler<'_> {
         self.check_reads(&frames)?;
         let signal = |s| self.signal(s, &frames, &messages, &sheet, &index);
         let signals = d.signal.iter().map(signal).collect::<Result<Vec<_>, _>>()?;
+        let mut taken = HashMap::new();
+        for (signal, CompiledSignal { frame, place, .. }) in d.signal.iter().zip(&signals) {
+            let Place::Bytes(field @ Field { bits: None, .. }) = place else { continue };
+            for byte in field.at..field.end() {
+                if let Some(first) = taken.insert((frame.0, byte), &signal.name) {
+                    let [name, first] = [signal.name.as_ref(), first.as_ref()];
+                    let why = format!("`{name}` and `{first}` share bytes: parts of one number have `bits`");
+                    return Err(self.at_name(&signal.name, why));
+                }
+            }
+        }
         let sets = d.set.iter().map(|s| self.set(s, &sheet)).collect::<Result<Vec<_>, _>>()?;
         let condition = |when: &toml::Spanned<String>| {
             Expression::compile(when.as_ref(), &index).map_err(|why| self.at(when.span(), why))

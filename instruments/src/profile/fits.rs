@@ -70,6 +70,9 @@ impl Compiler<'_> {
         if link.baud == Some(0) || link.bitrate == Some(0) {
             return wrong_link("a line of no bits per second carries nothing");
         }
+        if link.response_timeout_ms == 0 || link.connect_timeout_ms == 0 {
+            return wrong_link("`response_timeout_ms` and `connect_timeout_ms` are above zero");
+        }
         let serial = matches!(link.kind, LinkKind::ModbusRtu | LinkKind::Serial);
         if serial && (link.baud.is_none() || link.format.is_none()) {
             return wrong_link("a serial link needs `baud` and `format`");

@@ -3,9 +3,11 @@
 use super::compile::Compiler;
 use super::{CompiledSet, Frame};
 use crate::codec::pattern::Form;
-use crate::codec::text::{self, PREFIXES};
+use crate::codec::text;
 use crate::error::ProfileError;
 use crate::schema::{Role, Set, Si};
+use crate::units::Dimension::{Force, Frequency, Length, Pressure, Speed, Time};
+use crate::units::{Unit, power_of};
 use toml::Spanned;
 
 /// SI units that take a prefix.
@@ -28,10 +30,7 @@ const NO_OFF: [&str; 4] = ["frequency", "pressure", "temperature", "humidity"];
 
 /// The power of ten that `written`, such as `mm/s`, has over the SI unit, such as `m/s`.
 pub fn power_of_ten(written: &str, unit: &str) -> Option<i32> {
-    let one = |written: &str, unit: &str| {
-        let fits = |(prefix, _): &&(&str, f64)| written.strip_prefix(prefix) == Some(unit);
-        PREFIXES.iter().find(fits).map(|(_, factor)| factor.log10().round() as i32)
-    };
+    let one = |written: &str, unit: &str| power_of(written.strip_suffix(unit)?);
     match (written.split_once('/'), unit.split_once('/')) {
         (Some((above, below)), Some((of, per))) => Some(one(above, of)? - one(below, per)?),
         (None, None) => one(written, unit),
@@ -40,11 +39,13 @@ pub fn power_of_ten(written: &str, unit: &str) -> Option<i32> {
 }
 
 /// Whether the SI value of one `unit` can be `factor`; the value that it must have where it cannot. The sign is
-/// the mounting's, and the weight of a mass is the place's.
+/// the mounting's, the weight of a mass is the place's, and factors that are no power of ten are rounded.
 fn contradicts(unit: &str, factor: f64, si_unit: &str) -> Option<f64> {
-    let weight = || power_of_ten(unit, "g").filter(|_| si_unit == "N").map(|p| (p - 3, 9.80665, 0.01));
-    let (power, times, within) = power_of_ten(unit, si_unit).map(|p| (p, 1.0, 1e-6)).or_else(weight)?;
-    let expected = times * 10_f64.powi(power);
+    let all = [Force, Frequency, Length, Pressure, Speed, Time];
+    let dimension = all.into_iter().find(|dimension| dimension.si() == si_unit);
+    let known = || Some((Unit::parse(dimension?, unit)?.factor().abs(), 0.01));
+    let power = power_of_ten(unit, si_unit).map(|power| (10_f64.powi(power), 1e-6));
+    let (expected, within) = power.or_else(known)?;
     ((factor.abs() / expected - 1.0).abs() > within).then_some(expected)
 }
 

@@ -89,7 +89,7 @@ pub struct Stream {
     /// `high_first` or `low_first`: the order of the check's bytes. Left out: low first where the check is reflected, as is usual.
     pub check_order: Option<CheckOrder>,
     /// In place of length and check: the instrument sends lines of text like this one, `{lateral},{normal}`,
-    /// each number by its signal's name. See [`crate::codec::pattern`].
+    /// each number by its signal's name. See docs/profiles.md.
     pub line: Option<String>,
     /// Frames in a row that make an alignment believed.
     #[serde(default = "one_frame")]
@@ -175,7 +175,7 @@ pub struct Query {
     /// The answer is a number, an SI prefix or none, and this unit, as `5mm/s/V`; left out for a bare number or a truth.
     pub unit: Option<String>,
     /// The answer is a line like this one, `AMP={amplitude}%,F={frequency}`: each number by its signal's
-    /// name. See [`crate::codec::pattern`].
+    /// name. See docs/profiles.md.
     pub answer: Option<String>,
     /// Questions per second.
     pub rate_hz: f64,

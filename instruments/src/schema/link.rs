@@ -64,7 +64,7 @@ pub struct Link {
     /// Pause between two requests, in ms.
     #[serde(default)]
     pub min_gap_ms: f64,
-    /// Alarms: lines sent without a request, such as `ALARM {code}`. See [`crate::codec::pattern`].
+    /// Alarms: lines sent without a request, such as `ALARM {code}`. See docs/profiles.md.
     #[serde(default)]
     pub unsolicited: Vec<String>,
     /// A query that is put after every set-point, and what its answer must begin with.

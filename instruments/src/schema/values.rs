@@ -100,7 +100,7 @@ pub struct Set {
     #[serde(rename = "type", default)]
     pub number: Option<NumberType>,
     /// The line of text that carries it; `{}` is the value, `{name}` the newest one of another set-point.
-    /// Forms such as `{:.1}` and `{:04X}`: see [`crate::codec::pattern`].
+    /// Forms such as `{:.1}` and `{:04X}`: see docs/profiles.md.
     pub send: Option<String>,
     /// The line of text where the value is zero.
     pub send_zero: Option<String>,

@@ -4,8 +4,8 @@ use super::grid::{Cell, Grid};
 use super::map::{Map, Taken, parts, stated, unit_row};
 use super::remarks::usual;
 use super::targets::{Id, Target, plain};
-use super::units::{Dimension, Unit};
 use super::values::all_differ;
+use instruments::units::{Dimension, Unit};
 
 /// What a header means, and the unit that it states.
 type Meaning = (&'static Target, Option<(String, Unit)>);

@@ -2,7 +2,7 @@
 
 use super::grid::{Cell, Grid, Row, middle};
 use super::guess::heads;
-use super::units::is_unit;
+use instruments::units::is_unit;
 
 mod below;
 

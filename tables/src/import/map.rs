@@ -2,7 +2,7 @@
 
 use super::grid::Grid;
 use super::targets::{Id, TARGETS, Target, plain};
-use super::units::Unit;
+use instruments::units::Unit;
 
 mod doubts;
 mod entries;

@@ -2,7 +2,8 @@
 
 use super::grid::Grid;
 use super::values::{Dropped, NO_NUMBER, NO_TIME, NO_WAY};
-use super::{Import, map, units};
+use super::{Import, map};
+use instruments::units;
 
 impl Import<'_> {
     /// Refuses a map that lacks columns, all at once.

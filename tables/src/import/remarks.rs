@@ -4,6 +4,7 @@ use super::values::{all_differ, middle, sorted};
 use diagnosis::data::{DataError, Table};
 use models::condition::Condition;
 use models::covariate::{self, Covariate};
+use models::finger::Finger;
 use models::pass::Pass;
 use runs::human::number;
 use serde::Serialize;
@@ -18,14 +19,15 @@ pub struct Range {
 }
 
 /// What tribometers do, from rock friction at nanometres a second to pin on disk: values beyond are another
-/// unit more often than another machine.
-const USUAL: [(&Covariate, [f64; 2]); 6] = [
+/// unit more often than another machine. Air in kPa or hPa is below, and a humidity as a ratio.
+const USUAL: [(&Covariate, [f64; 2]); 7] = [
     (&covariate::AMPLITUDE, [1e-8, 1e-4]),
     (&covariate::FREQUENCY, [1e3, 1e6]),
     (&covariate::SPEED, [1e-8, 2.0]),
     (&covariate::NORMAL_FORCE, [1e-4, 1e3]),
     (&covariate::POSITION, [1e-9, 1.0]),
-    (&covariate::AMBIENT_PRESSURE, [1e2, 1e6]),
+    (&covariate::AMBIENT_PRESSURE, [2e3, 1e6]),
+    (&covariate::RELATIVE_HUMIDITY, [1.01, 100.0]),
 ];
 /// Lateral over normal force: from well lubricated to soft rubber.
 const RATIO: [f64; 2] = [2e-3, 20.0];
@@ -36,9 +38,16 @@ const PLATE_SPEED: f64 = 10.0;
 
 /// Whether values are those of a tribometer, as far as a range is known for the column.
 pub fn usual(column: &str, values: &[f64]) -> bool {
-    let sizes = sorted(values.iter().map(|v| v.abs()).filter(|v| *v > 0.0));
-    let within = |[low, high]: [f64; 2]| middle(&sizes).is_none_or(|v| (low..=high).contains(&v));
-    USUAL.iter().find(|(c, _)| c.name == column).is_none_or(|(_, range)| within(*range))
+    let of = USUAL.iter().find(|(c, _)| c.name == column);
+    of.and_then(|(c, range)| slip(typical(c, values.iter().copied())?, *range)).is_none()
+}
+
+/// The size that a column is judged by: the middle one; the largest of places and of the air, some near zero.
+fn typical(column: &Covariate, values: impl Iterator<Item = f64>) -> Option<f64> {
+    let sizes = sorted(values.map(f64::abs).filter(|v| *v > 0.0));
+    let of_air = || covariate::OPTIONAL.iter().any(|air| air.name == column.name);
+    let largest = column.name == covariate::POSITION.name || of_air();
+    if largest { sizes.last().copied() } else { middle(&sizes) }
 }
 
 /// The range of every column that the table has.
@@ -51,7 +60,7 @@ pub fn ranges(passes: &[Pass], columns: &[&'static str]) -> Vec<Range> {
         .collect()
 }
 
-/// How a value is not among the usual ones: by a factor of a thousand or a million, or otherwise.
+/// How a value is not among the usual ones: by a factor of a thousand, a million or a hundred, or otherwise.
 fn slip(value: f64, [low, high]: [f64; 2]) -> Option<&'static str> {
     let within = |v: f64| v >= low && v <= high;
     if value <= 0.0 || within(value) {
@@ -62,6 +71,7 @@ fn slip(value: f64, [low, high]: [f64; 2]) -> Option<&'static str> {
         (1e-6, "a million times too large"),
         (1e3, "a thousand times too small"),
         (1e6, "a million times too small"),
+        (1e2, "a hundred times too small"),
     ]
     .into_iter()
     .find_map(|(factor, words)| within(value * factor).then_some(words))
@@ -93,6 +103,16 @@ fn scattered(passes: &[Pass]) -> Option<String> {
     })
 }
 
+/// What looks wrong with the forces where no vibration loses contact with a finger, as in mN under N.
+pub fn never_lifts(passes: &[Pass], finger: &Finger) -> Option<String> {
+    let k_n = finger.normal_stiffness_n_per_m;
+    let most = passes.iter().map(|p| p.amplitude.metres() * k_n / (2.0 * p.normal_force_n));
+    let most = most.fold(0.0, f64::max);
+    let why = "by the stiffness of rig.toml no vibration loses contact: w is at most";
+    (0.0 < most && most < 1.0)
+        .then(|| format!("normal_force_n: {why} {} of 2 F / k_n. Are the forces in mN?", number(most)))
+}
+
 /// Everything that looks wrong in a point table, in sentences.
 pub fn of_table(passes: &[Pass]) -> Vec<String> {
     let all = covariate::REQUIRED.iter().chain(covariate::OPTIONAL.iter());
@@ -104,10 +124,7 @@ pub fn remarks(passes: &[Pass], columns: &[&'static str]) -> Vec<String> {
     let mut list = Vec::new();
     let conditions: Vec<Condition> = passes.iter().map(|p| p.condition(1.0)).collect();
     for (c, usual) in USUAL.iter().filter(|(c, _)| columns.contains(&c.name)) {
-        let sizes = sorted(conditions.iter().filter_map(|q| c.of(q)).map(f64::abs).filter(|v| *v > 0.0));
-        // Places are judged by the largest: a table may lie about zero.
-        let place = c.name == covariate::POSITION.name;
-        let typical = if place { sizes.last().copied() } else { middle(&sizes) };
+        let typical = typical(c, conditions.iter().filter_map(|q| c.of(q)));
         if let Some((typical, words)) = typical.and_then(|v| Some((v, slip(v, *usual)?))) {
             let (factor, unit) = c.shown;
             let [typical, low, high] = [typical, usual[0], usual[1]].map(|v| number(v * factor));

@@ -1,6 +1,6 @@
 //! What a column of a foreign table can stand for, and which headers usually say so.
 
-use super::units::Dimension;
+use instruments::units::Dimension;
 
 /// How a cell is read.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]

@@ -3,7 +3,7 @@
 use super::grid::{Cell, Grid, Row};
 use super::map::{Map, way};
 use super::targets::{COUNT, ColumnKind, Id};
-use super::units::{Dimension, Unit};
+use instruments::units::{Dimension, Unit};
 use models::condition::Condition;
 use models::covariate;
 use models::pass::Pass;
@@ -123,7 +123,14 @@ impl Values {
                 ColumnKind::Number(_) if column.target.id == Id::Time => {
                     clock.or_else(number).ok_or_else(|| drop(NO_TIME))?
                 }
-                ColumnKind::Number(_) => number().ok_or_else(|| drop(NO_NUMBER))?,
+                ColumnKind::Number(_) => number().ok_or_else(|| match cell {
+                    Cell::Clock(s) if grid.format.starts_with("workbook") => {
+                        // 1970 begins with a workbook's day 25569.
+                        let date = calibration::certificate::date::format(*s as i64 - 25_569 * 86_400);
+                        drop(&format!("the spreadsheet made a date of it, {date}"))
+                    }
+                    _ => drop(NO_NUMBER),
+                })?,
             };
             values.numbers[column.target.id as usize] = value;
         }

@@ -1,6 +1,7 @@
 //! What may not be guessed, and tables that would become wrong passes without a word.
 
 use super::guess;
+use crate::import::grid::Cell;
 use crate::import::map::Map;
 use crate::import::{Cut, Imported, Marks, Wanted, import, read};
 use std::fmt::Write;
@@ -198,6 +199,21 @@ fn a_factor_behind_the_unit_leaves_a_column_open() {
     assert!(said.contains("was left open: 'comp. +' is not a unit of normal_force"), "{said}");
 }
 
+/// A spreadsheet makes 1.35 a day in January 2035.
+#[test]
+fn a_number_that_became_a_date_is_shown_as_that_date() {
+    let text = table("t (s);v (mm/s);Fz (N);Fx (N)", "{t};{v};0.25;{fx}");
+    let mut grid = read(Path::new("a.csv"), text.as_bytes(), None, Marks::default(), &[]).unwrap();
+    grid.format = "workbook, sheet 'A'".into();
+    grid.rows[3].cells[2] = Cell::Clock(4_260_384_000.0);
+    let mut map = Map::default();
+    map.set(&["amplitude_pp=0".into()]).unwrap();
+    map.columns = guess(&grid, &map);
+    let log = import("a.xlsx", b"", &grid, &Wanted { map, ..Wanted::default() }).unwrap().log;
+    let reason = &log.dropped[0].reason;
+    assert!(reason.contains("the spreadsheet made a date of it, 2035-01-01"), "{reason}");
+}
+
 #[test]
 fn a_choice_is_left_to_the_reader_and_named() {
     let said = beside("Fz (N);Fx (N);Fy (N)", "0.25;0.01;{fx}").unwrap_err();
@@ -215,6 +231,29 @@ fn the_pressure_of_a_contact_is_not_that_of_the_air() {
         assert_eq!(targets(header), "", "{header}");
     }
     assert_eq!(targets("Air pressure [kPa]"), "\"Air pressure [kPa]\"=ambient_pressure:kPa");
+}
+
+/// Air is judged by its largest value: a vacuum of some kPa is one, 101.3 and 1013 are no pascals.
+#[test]
+fn a_pressure_in_other_units_and_a_humidity_as_a_ratio_are_remarked_on() {
+    let said = |header: &str, air: &str| {
+        let text = table(
+            &format!("t (s);v (mm/s);Fz (N);Fx (N);{header}"),
+            &format!("{{t}};{{v}};0.25;{{fx}};{air}"),
+        );
+        let text = text.replacen(air, "0.001", 1);
+        imported(&text, "", "amplitude_pp=0", false).unwrap().log.remarks.concat()
+    };
+    let kilo = said("Ambient pressure [Pa]", "101.3");
+    assert!(kilo.contains("ambient_pressure_pa: 0.101 kPa is a thousand times too small"), "{kilo}");
+    let hecto = said("Ambient pressure [Pa]", "1013");
+    assert!(hecto.contains("ambient_pressure_pa: 1.01 kPa is a hundred times too small"), "{hecto}");
+    for right in ["101325", "50660", "3000"] {
+        assert_eq!(said("Ambient pressure [Pa]", right), "", "{right}");
+    }
+    let ratio = said("RH [%]", "0.45");
+    assert!(ratio.contains("relative_humidity_pct: 0.45 % is a hundred times too small"), "{ratio}");
+    assert_eq!(said("RH [%]", "45"), "");
 }
 
 #[test]

@@ -4,7 +4,7 @@ use super::{Extent, ONE_TEXT, Source};
 use crate::import::grid::{Block, Cell, Grid, Row};
 use crate::import::guess::{heads, name_of, sums_up};
 use crate::import::map::{stated, unit_row};
-use crate::import::units::is_unit;
+use instruments::units::is_unit;
 
 impl Source {
     /// The rows from the first of the data on, with the headers among them.

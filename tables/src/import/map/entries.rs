@@ -4,7 +4,7 @@ use super::{Constant, Map, Taken, stated, unit_row};
 use crate::import::apart;
 use crate::import::grid::Grid;
 use crate::import::targets::{ColumnKind, Id, TARGETS, Target};
-use crate::import::units::{Dimension, Unit};
+use instruments::units::{Dimension, Unit};
 
 /// What is wrong with an entry of `--map` or `--set`, or with the map under a second header (in row `row`).
 #[derive(Clone, Debug, PartialEq, Eq, thiserror::Error)]

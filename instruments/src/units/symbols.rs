@@ -17,6 +17,7 @@ pub const UNITS: &[(Dimension, &[&str], Unit)] = &[
     // Loads are often stated as the mass that hangs there.
     (Dimension::Force, &["gf", "g", "gram", "grams", "gram-force", "grf", "p", "pond"], GRAM_FORCE),
     (Dimension::Force, &["mgf", "mg"], Unit { ten: GRAM_FORCE.ten - 3, ..GRAM_FORCE }),
+    (Dimension::Force, &["ugf", "ug"], Unit { ten: GRAM_FORCE.ten - 6, ..GRAM_FORCE }),
     (Dimension::Force, &["kgf", "kg", "kp"], Unit { ten: GRAM_FORCE.ten + 3, ..GRAM_FORCE }),
     (Dimension::Force, &["lbf", "lb", "lbs"], Unit::times(4.448_221_615_260_5, 0)),
     (Dimension::Pressure, &["atm"], Unit::times(101_325.0, 0)),

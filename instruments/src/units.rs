@@ -1,5 +1,5 @@
-//! Units of foreign tables. A number keeps its digits: a unit that is a power of ten of the SI's moves the decimal point
-//! and rounds once, as if the SI value had been written; any other takes one multiplication or division more.
+//! Units of profiles and of foreign tables. One that is a power of ten of the SI's moves the decimal point of a
+//! number and rounds once, as if the SI value had been written; any other takes one operation more.
 
 use std::f64::consts::PI;
 use symbols::{UNITS, WORDS};
@@ -236,26 +236,30 @@ fn plain(text: &str) -> String {
 
 /// A base with a prefix of the SI.
 fn prefixed(text: &str, bases: &[(&str, i32)]) -> Option<Unit> {
-    bases.iter().find_map(|(base, ten)| {
-        let prefix = match text.strip_suffix(base)? {
-            "" => 0,
-            "n" => -9,
-            "u" => -6,
-            "m" => -3,
-            "c" => -2,
-            "d" => -1,
-            "da" => 1,
-            "h" => 2,
-            "k" | "K" => 3,
-            "M" => 6,
-            _ => return None,
-        };
-        Some(Unit::ten(ten + prefix))
+    let power = |(base, ten): &(&str, i32)| Some(Unit::ten(ten + power_of(text.strip_suffix(base)?)?));
+    bases.iter().find_map(power)
+}
+
+/// The power of ten of a prefix of the SI, 0 of none.
+pub fn power_of(prefix: &str) -> Option<i32> {
+    Some(match prefix {
+        "" => 0,
+        "n" => -9,
+        "u" | "\u{b5}" | "\u{3bc}" => -6,
+        "m" => -3,
+        "c" => -2,
+        "d" => -1,
+        "da" => 1,
+        "h" => 2,
+        "k" | "K" => 3,
+        "M" => 6,
+        "G" => 9,
+        _ => return None,
     })
 }
 
-/// A decimal number with its point moved, rounded once.
-fn moved(number: &str, ten: i32) -> Option<f64> {
+/// A decimal number with its point moved, rounded once; `None` for what is not a finite number.
+pub fn moved(number: &str, ten: i32) -> Option<f64> {
     let number = number.trim();
     let (mantissa, exponent) = match number.split_once(['e', 'E']) {
         Some((mantissa, exponent)) => (mantissa, exponent.parse::<i32>().ok()?),
