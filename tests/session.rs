@@ -184,6 +184,10 @@ fn bad_input_is_refused_with_its_place_and_nothing_is_touched() {
         ("measure_s = 0.1", "measure_s = 10.0", "needs"),
         ("seed = 7", "seed = -7", "0 or more"),
         ("reference_every = 4", "reference_every = 4\ndirections = [2]", "directions are 1, -1 or both"),
+        ("reference_every = 4", "reference_every = 4\ndirections = [1, 1]", "directions are 1, -1 or both"),
+        ("[0.5e-6, 1e-6, 2e-6, 3e-6]", "[1e-6, 2e-6, \"1000nm\"]", "amplitude_pp_m lists a value twice"),
+        ("[0.5e-6, 1e-6, 2e-6, 3e-6]", "[0, 1e-6, 0.0]", "`replicates` repeats every condition"),
+        ("[0.5e-6, 1e-6, 2e-6, 3e-6]", "[]", "amplitude_pp_m lists no value"),
     ];
     for (from, to, expected) in cases {
         let path = folder.path().join("bad.toml");

@@ -149,7 +149,7 @@ pub enum Evaluation {
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize, schemars::JsonSchema)]
 #[serde(deny_unknown_fields)]
 pub struct Certificate {
-    /// [`SCHEMA`].
+    /// `muprime.certificate/1`.
     pub schema: String,
     /// What was calibrated.
     pub kind: CertificateKind,

@@ -40,7 +40,7 @@ class Run:
     def cycles(self, points: Iterable[int] = ()) -> pyarrow.Table:
         """The recorded cycles as an Arrow table: session, loop time, forces, ``mu'``, drive, stage, safety.
 
-        ``points``: numbers of passes; none: every cycle, also those between passes (some 200 bytes each in memory).
+        ``points``: numbers of passes, each one of the run's; none: every cycle, also those between passes (some 200 bytes each in memory).
         """
         return _table(_muprime.cycles(self.folder, list(points)))
 

@@ -4,7 +4,7 @@ use crate::{MuprimeError, refused};
 use miette::IntoDiagnostic;
 use models::prediction::{FrictionModel, SpringSlider};
 use pyo3::prelude::*;
-use runs::plan::{Plan, PlanFile};
+use runs::plan::Plan;
 use runs::session::Job;
 use runs::setup::Setup;
 use std::path::PathBuf;
@@ -25,10 +25,10 @@ pub fn plan_parse(name: &str, text: &str) -> PyResult<(String, String, String)> 
 /// The same of a plan's document (JSON): it is written as text first, so that what is refused has its place there.
 #[pyfunction]
 pub fn plan_made(document: &str) -> PyResult<(String, String, String)> {
-    let file: PlanFile =
-        serde_json::from_str(document).map_err(|why| MuprimeError::new_err(format!("the plan: {why}")))?;
-    let text = toml::to_string(&file).map_err(|why| MuprimeError::new_err(format!("the plan: {why}")))?;
-    Plan::parse(&file.name, &text).and_then(parts).map_err(refused)
+    let table: Result<toml::Table, _> = serde_json::from_str(document);
+    let table = table.map_err(|why| MuprimeError::new_err(format!("the plan: {why}")))?;
+    let name = table.get("name").and_then(toml::Value::as_str).unwrap_or("the plan");
+    Plan::parse(name, &table.to_string()).and_then(parts).map_err(refused)
 }
 
 fn parts(plan: Plan) -> miette::Result<(String, String, String)> {

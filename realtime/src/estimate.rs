@@ -10,14 +10,20 @@ pub const WINDOW_MAX: usize = 256;
 
 /// How the running estimate is made.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize, schemars::JsonSchema)]
-#[serde(deny_unknown_fields)]
+#[serde(deny_unknown_fields, default)]
 pub struct EstimateConfig {
-    /// Samples in the running mean, 1 to [`WINDOW_MAX`].
+    /// Samples in the running mean, 1 to 256.
     pub window: usize,
     /// N. Below this normal force `mu'` is undefined: there is no finger, and noise must not be divided by noise.
     pub normal_force_min_n: f64,
     /// Standard deviation of one sample of either force in N, from the calibration.
     pub sample_sd_n: f64,
+}
+
+impl Default for EstimateConfig {
+    fn default() -> Self {
+        EstimateConfig { window: 50, normal_force_min_n: 0.02, sample_sd_n: 0.002 }
+    }
 }
 
 /// Friction coefficient without vibration, as known at a time.

@@ -288,7 +288,7 @@ impl Plan {
             );
         }
         let remedy = || "write [1], [-1] or [1, -1]".to_string();
-        let unknown = |all: &[i8]| all.iter().any(|d| *d != 1 && *d != -1);
+        let unknown = |all: &[i8]| !matches!(all, [] | [1] | [-1] | [1, -1] | [-1, 1]);
         if file.directions.is_empty() || unknown(&file.directions) {
             wrong.add(&["directions"], "directions are 1, -1 or both", remedy());
         }
@@ -297,11 +297,17 @@ impl Plan {
                 let place = points::series_place(text, index, "directions");
                 wrong.add_at(place, "directions are 1, -1 or both", remedy());
             }
-            for (covariate, _) in series.lists().into_iter().filter(|(_, list)| list.is_empty()) {
-                if let Some(place) = points::series_place(text, index, covariate.name) {
-                    let problem = format!("{} lists no value", covariate.name);
-                    wrong.add_at(Some(place), problem, "list its values, or leave the key out".to_string());
-                }
+            for (k, (covariate, list)) in series.lists().into_iter().enumerate() {
+                let Some(place) = points::series_place(text, index, covariate.name) else { continue };
+                // A level of the air, of which there are three, is visited again where the list returns to it.
+                let same = |a: &f64, b: &f64| k > 2 && (a - b).abs() <= 1e-9 * b.abs();
+                let again = (1..list.len()).any(|k| list[..k].iter().any(|value| same(value, &list[k])));
+                let (what, remedy) = match again {
+                    _ if list.is_empty() => ("no value", "list its values, or leave the key out"),
+                    true => ("a value twice", "list it once; `replicates` repeats every condition"),
+                    false => continue,
+                };
+                wrong.add_at(Some(place), format!("{} lists {what}", covariate.name), remedy.to_string());
             }
         }
         if !(1..=1000).contains(&file.replicates) {

@@ -81,7 +81,7 @@ pub struct SetupFile {
     /// Noise of a pass.
     pub noise: PassNoise,
     /// The running estimate.
-    #[serde(default = "default_estimate")]
+    #[serde(default)]
     pub estimate: EstimateConfig,
     /// Certificates by path, relative to the setup file.
     #[serde(default)]
@@ -250,10 +250,6 @@ impl Guards {
 
 /// The warning if a person's fingertip is named and nobody is there.
 pub const NOBODY: &str = "nobody touches the plate (stated in the setup): the guards for a finger are off";
-
-const fn default_estimate() -> EstimateConfig {
-    EstimateConfig { window: 50, normal_force_min_n: 0.02, sample_sd_n: 0.002 }
-}
 
 /// A setup that passed every check.
 #[derive(Clone, Debug)]

@@ -55,5 +55,5 @@ fn creep_orientation_dynamics_and_noise_come_back_from_the_example_files() {
     expect(&noise, "lateral.white_density", 2.0 * 400.0 / 1000.0, 0.4);
     remark(&noise, "lateral: a line at 49.80 Hz");
     remark(&noise, "the converter's step is 1 counts");
-    remark(&noise, "frozen_after = ");
+    remark(&noise, "frozen_after = 20, the least that a setup takes");
 }

@@ -163,6 +163,9 @@ assert (FOLDER / "mine/points.csv").read_bytes() == (FOLDER / "theirs/points.csv
 assert np.allclose(mine.pandas()["amplitude_pp_m"], order["amplitude_pp_m"], atol=1e-9) and np.array_equal(mine.pandas()["direction"], order["direction"])
 assert muprime.Plan.load(FOLDER / "mine.toml").document == made.document == muprime.Plan.parse(made.toml).document
 refusal(lambda: muprime.Plan.make("none"), "[[series]]")
+refusal(lambda: muprime.Plan.make("empty", {"amplitude_pp_m": [], "speed_m_s": [0.01, 0.05]}), "amplitude_pp_m lists no value")
+assert muprime.Plan.make("units", {"amplitude_pp_m": ["2um"]}).document["series"][0]["amplitude_pp_m"] == [2e-6]
+refusal(lambda: mine.cycles(points=[2, 999]), "no cycles of point 999")
 refusal(lambda: muprime.Plan.make("typo", {"amplitude_m": [1e-6]}), "amplitude_m")
 refusal(lambda: muprime.Plan.make("far", {"amplitude_pp_m": [1e-3]}).passes(), "amplitude_pp_m = 1 mm", "outside")
 refusal(lambda: muprime.Plan.load("no-such-plan"), "bundled plans")

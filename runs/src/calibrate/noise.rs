@@ -110,12 +110,14 @@ pub fn certified(args: &Args) -> miette::Result<Issued> {
         frozen.push(equal.frozen_after(args.false_alarm));
         spectra.push(spectrum);
     }
-    let frozen_after = if let [Some(a), Some(b)] = frozen.as_slice() { Some((*a).max(*b)) } else { None };
-    remarks.push(match frozen_after {
-        Some(n) => format!(
+    let equal = if let [Some(a), Some(b)] = frozen.as_slice() { Some((*a).max(*b)) } else { None };
+    let frozen_after = equal.filter(|n| *n <= 1000).map(|n| n.max(20));
+    remarks.push(match equal.zip(frozen_after) {
+        Some((n, stated)) => format!(
             "frozen-value rule: {n} equal samples in a row, at most {:.0e} false alarms a sample; in the setup: [limits] \
-             frozen_after = {n}",
-            args.false_alarm
+             frozen_after = {stated}{}",
+            args.false_alarm,
+            if stated > n { ", the least that a setup takes" } else { "" }
         ),
         None => "no frozen-value rule: the noise is below the converter's step, equal samples say nothing".into(),
     });

@@ -8,7 +8,7 @@ use sim::virtual_rig::VirtualRig;
 
 const PLAN: &str = "name = \"p\"\nseed = 3\nreference_every = 0\n[pass]\nsettle_s = 0.05\nmeasure_s = 0.05\n[base]\n\
     amplitude_pp_m = 2e-6\nfrequency_hz = 27500\nspeed_m_s = 0.02\nnormal_force_n = 0.25\n[[series]]\n\
-    amplitude_pp_m = [2e-6, 1e-6, 2e-6, 3e-6, 1.5e-6]\n";
+    amplitude_pp_m = [2e-6, 1e-6, 2.5e-6, 3e-6, 1.5e-6]\n";
 
 /// Sweeps with somebody who asks for a pause in these spans of time (s); returns the passes, the events and
 /// every row with whether the sweep rested then.

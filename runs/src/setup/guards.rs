@@ -124,10 +124,13 @@ pub(super) fn contradictions(file: &SetupFile, tip: Option<&Fingertip>, wrong: &
             "leave dead_weight_n out; where weights do load the finger, copy the profile and take `load` out of it".to_string(),
         );
     }
-    if limits.dead_man_key == Some(true) && is_wired(file, "dead_man") {
+    let wired = is_wired(file, "dead_man");
+    if limits.dead_man_key == Some(true) && (wired || !person(file, tip)) {
+        let nobody = "by this setup no person touches the plate: it would do nothing";
+        let why = if wired { "a dead-man device is wired ([safety_inputs])" } else { nobody };
         wrong.add(
             &["limits", "dead_man_key"],
-            "dead_man_key = true, and a dead-man device is wired ([safety_inputs])",
+            format!("dead_man_key = true, and {why}"),
             "leave dead_man_key out; where no device is on that contact, name the others in `wired`"
                 .to_string(),
         );

@@ -265,7 +265,7 @@ pub fn run(scene: &Scene, keep: bool) -> Found {
 /// Only if the bench's own limits or world are not allowed: a fault of this module.
 pub fn run_with(scene: &Scene, keep: bool, core: Core) -> Found {
     let limits = scene.limits().checked().expect("the bench's limits are within the hard ones");
-    let estimate = EstimateConfig { window: 50, normal_force_min_n: 0.02, sample_sd_n: 0.002 };
+    let estimate = EstimateConfig::default();
     let config = Config { limits, estimate, exposed: Exposed::default() };
     let slider = SpringSlider::new(Finger::paper()).expect("the paper's finger is one");
     let diverges = scene.first(|w| w == What::ModelDiverges).map(time_of);
