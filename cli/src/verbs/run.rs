@@ -272,7 +272,7 @@ impl Followers {
                 let bar = self.bar.clone();
                 print::draw("", move || {
                     bar.set_position((planned.saturating_sub(all) + made) as u64);
-                    bar.set_message(format!("{left_s:.0} s to go"));
+                    bar.set_message(format!("{:.0} s to go", left_s.max(0.0)));
                 });
             }
             Update::Off(off) if !off.read_back => {
