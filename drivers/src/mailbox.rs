@@ -16,6 +16,8 @@ pub struct Mailbox<T>(Arc<Inner<T>>);
 struct Inner<T> {
     newest: ArrayQueue<T>,
     off: AtomicBool,
+    /// What the link handed out last drives or moves.
+    drives: AtomicBool,
 }
 
 impl<T> Clone for Mailbox<T> {
@@ -26,7 +28,11 @@ impl<T> Clone for Mailbox<T> {
 
 impl<T> Default for Mailbox<T> {
     fn default() -> Self {
-        Self(Arc::new(Inner { newest: ArrayQueue::new(1), off: AtomicBool::new(false) }))
+        Self(Arc::new(Inner {
+            newest: ArrayQueue::new(1),
+            off: AtomicBool::default(),
+            drives: AtomicBool::default(),
+        }))
     }
 }
 
@@ -52,6 +58,16 @@ impl<T> Mailbox<T> {
     /// The same, and forgets it: whoever asks sends it.
     pub fn take_off(&self) -> bool {
         self.0.off.swap(false, Ordering::AcqRel)
+    }
+
+    /// Notes whether what the link now hands out drives or moves.
+    pub fn handed_out(&self, drives: bool) {
+        self.0.drives.store(drives, Ordering::Release);
+    }
+
+    /// Whether what the link handed out last drives or moves.
+    pub fn drives(&self) -> bool {
+        self.0.drives.load(Ordering::Acquire)
     }
 
     /// Drops the command that waits. A noted 'off' stays.

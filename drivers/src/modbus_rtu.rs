@@ -8,6 +8,7 @@
 
 use super::ended::{BAD_IN_A_ROW, Closed, Ended};
 use super::modbus::{Blocks, Conversation, Registers, Trouble};
+use super::off::{Hurry, OFF_WAITS_MS};
 use super::serial::{Line, SharedLine};
 use super::session::Session;
 use super::setup::InstrumentSetup;
@@ -32,6 +33,7 @@ pub(crate) fn spawn(instrument: &InstrumentSetup, session: Session) -> Result<Jo
     }
     session.spawn(move |session| {
         let mut wire = Rtu::open(&path, baud, link.line_format(), unit, link.response_timeout_ms)?;
+        wire.hurry = session.hurry.clone();
         let health = session.endpoint.health();
         health.count(&health.connections);
         let stream = session.endpoint.profile().description.stream.clone();
@@ -44,7 +46,7 @@ pub(crate) fn spawn(instrument: &InstrumentSetup, session: Session) -> Result<Jo
         }
         // Whatever an earlier connection was still owed comes now or never.
         let longest = link.patience();
-        wire.line.with(|line| line.drain(longest, 10 * longest))?;
+        wire.line.with(|line| line.drain(longest, 10 * longest, &Hurry::default()))?;
         let conversation = Conversation::begin(session, &mut wire)?;
         match stream {
             None => conversation.go_on(session, rate_hz),
@@ -65,6 +67,7 @@ pub struct Rtu {
     answer_ms: u32,
     quiet_ms: u32,
     silence: f64,
+    hurry: Hurry,
 }
 
 impl Rtu {
@@ -74,7 +77,8 @@ impl Rtu {
     /// Where the port is not there, is in use, or the format makes no sense.
     pub fn open(path: &str, baud: u32, format: &str, unit: u8, answer_ms: u32) -> Result<Self, Ended> {
         let line = SharedLine::open(path, baud, format)?;
-        Ok(Rtu { line, unit, answer_ms, quiet_ms: answer_ms, silence: rtu::silence_s(baud) })
+        let (silence, hurry) = (rtu::silence_s(baud), Hurry::default());
+        Ok(Rtu { line, unit, answer_ms, quiet_ms: answer_ms, silence, hurry })
     }
 
     /// Writes the safe set-points, every block of them, and needs no answer. The 'off' that is answered and read back follows.
@@ -84,8 +88,8 @@ impl Rtu {
         for (n, (block, words)) in off.iter().enumerate() {
             if n > 0 {
                 // One at a time has the line: where there is an answer to the one before, it is let through.
-                let answer = Duration::from_millis(u64::from(self.answer_ms));
-                self.line.with(|line| line.drain(answer, 2 * answer))?;
+                let answer = Duration::from_millis(u64::from(self.answer_ms.min(OFF_WAITS_MS)));
+                self.line.with(|line| line.drain(answer, 2 * answer, &self.hurry))?;
             }
             std::thread::sleep(Duration::from_secs_f64(self.silence));
             let request = write_request(self.unit, block.table, block.address, words);
@@ -96,17 +100,18 @@ impl Rtu {
 
     /// One request and its answer.
     fn ask(&mut self, request: &Request) -> Result<Vec<u8>, Trouble> {
-        let (answer_ms, silence) = (self.answer_ms, Duration::from_secs_f64(self.silence));
+        let (answer_ms, hurry) = (self.answer_ms, &self.hurry);
+        let silence = Duration::from_secs_f64(self.silence);
         let exchange = |line: &mut Line| {
             line.write(&request.bytes)?;
-            let deadline = Instant::now() + Duration::from_millis(u64::from(answer_ms));
+            let mut deadline = Instant::now() + Duration::from_millis(u64::from(answer_ms));
             let mut answer = Vec::with_capacity(request.answer_length);
             let mut buffer = [0; 260];
             loop {
-                let count = line.read(&mut buffer, deadline)?;
-                if count == 0 {
+                let count = line.read(&mut buffer, hurry.look(&mut deadline))?;
+                if count == 0 && Instant::now() >= deadline {
                     return Err(match answer.len() {
-                        0 => Ended::Timeout(answer_ms),
+                        0 => Ended::Timeout(hurry.limit_ms(answer_ms)),
                         n => Ended::Cut(format!(
                             "{n} bytes came in place of {}: {}: are baud and format right, and `unit` one of its own?",
                             request.answer_length,
@@ -132,7 +137,7 @@ impl Rtu {
             RtuError::Exception(code) => Trouble::Refused(super::remedy::exception(code)),
             other => {
                 let quiet = Duration::from_millis(u64::from(self.quiet_ms));
-                match self.line.with(|line| line.drain(quiet, 10 * quiet)) {
+                match self.line.with(|line| line.drain(quiet, 10 * quiet, &self.hurry)) {
                     Ok(_) => Trouble::Corrupt(other.to_string()),
                     Err(ended) => Trouble::Ended(ended),
                 }
@@ -146,7 +151,7 @@ impl Rtu {
         for _ in 0..STOP_TRIES {
             self.line.with(|line| line.write(&vec![byte; usize::from(count)]))?;
             let settle = Duration::from_millis(u64::from(stream.settle_ms));
-            if self.line.with(|line| line.drain(settle, settle * 3))? {
+            if self.line.with(|line| line.drain(settle, settle * 3, &self.hurry))? {
                 return Ok(());
             }
         }
@@ -220,7 +225,7 @@ mod tests {
     use crate::endpoint::Endpoint;
     use instruments::profile::Profile;
     use serialport::{SerialPort, TTYPort};
-    use std::io::Read;
+    use std::io::{Read, Write};
     use std::sync::Arc;
 
     /// An amplifier with its enable in a block of its own: 'off' goes into every block without an answer.
@@ -247,7 +252,8 @@ mod tests {
         let session = Session::new(endpoint, Instant::now(), Arc::default(), ready);
         let (mut instrument, driver) = TTYPort::pair().unwrap();
         let line = SharedLine::open(&driver.name().unwrap(), 115_200, "8N1").unwrap();
-        let mut wire = Rtu { line, unit: 2, answer_ms: 5, quiet_ms: 5, silence: 1e-3 };
+        let mut wire =
+            Rtu { line, unit: 2, answer_ms: 5, quiet_ms: 5, silence: 1e-3, hurry: Hurry::default() };
         wire.send_unanswered_off(&session).unwrap();
         instrument.set_timeout(Duration::from_millis(50)).unwrap();
         let (mut heard, mut buffer) = (Vec::new(), [0; 256]);
@@ -257,5 +263,22 @@ mod tests {
         let switch = rtu::write(2, 300, &[0]).bytes;
         let command = rtu::write(2, 100, &[0; 5]).bytes;
         assert_eq!(heard, [switch, command].concat(), "{heard:02x?}");
+    }
+
+    /// Neither an answer that stays away nor noise on the line keeps an 'off' that waits.
+    #[test]
+    fn an_off_that_waits_ends_an_exchange() {
+        let (mut instrument, driver) = TTYPort::pair().unwrap();
+        let line = SharedLine::open(&driver.name().unwrap(), 115_200, "8N1").unwrap();
+        let hour_ms = 3_600_000;
+        let hurry = Hurry::default();
+        let mut wire = Rtu { line, unit: 2, answer_ms: hour_ms, quiet_ms: hour_ms, silence: 1e-3, hurry };
+        wire.hurry.commands.handed_out(true);
+        wire.hurry.stop.store(true, std::sync::atomic::Ordering::Release);
+        let read = wire.read(Table::Holding, 0, 2);
+        assert!(matches!(read, Err(Trouble::Ended(Ended::Timeout(OFF_WAITS_MS)))), "{read:?}");
+        instrument.write_all(&[2, 3, 4, 0, 0, 0, 0, 0, 0]).unwrap();
+        let read = wire.read(Table::Holding, 0, 2);
+        assert!(matches!(read, Err(Trouble::Corrupt(_))), "{read:?}");
     }
 }

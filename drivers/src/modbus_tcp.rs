@@ -7,6 +7,7 @@
 
 use super::ended::{AddressError, Closed, Ended};
 use super::modbus::{Conversation, Registers, Trouble};
+use super::off::{Hurry, LOOK_EVERY};
 use super::session::Session;
 use super::setup::InstrumentSetup;
 use super::trace::Traced;
@@ -21,9 +22,6 @@ use tokio::runtime::Runtime;
 use tokio_modbus::client::{Context, Reader, Writer, tcp};
 use tokio_modbus::prelude::Slave;
 
-/// Whoever waits for an answer looks at the clock so often.
-const POLL_EVERY: Duration = Duration::from_millis(10);
-
 /// Starts the thread of one instrument.
 pub(crate) fn spawn(instrument: &InstrumentSetup, session: Session) -> Result<JoinHandle<Closed>, Ended> {
     let link = &session.endpoint.profile().description.link;
@@ -35,6 +33,7 @@ pub(crate) fn spawn(instrument: &InstrumentSetup, session: Session) -> Result<Jo
     session.spawn(move |session| {
         let clock = session.clock.clock().clone();
         let mut wire = Tcp::connect((&runtime, &clock), address, unit, connect_ms, answer_ms)?;
+        wire.hurry = session.hurry.clone();
         let health = session.endpoint.health();
         health.count(&health.connections);
         Conversation::begin(session, &mut wire)?.go_on(session, rate_hz)
@@ -59,22 +58,24 @@ pub fn resolve(address: &str, port: Option<u16>) -> Result<SocketAddr, AddressEr
     found.next().ok_or_else(|| AddressError::Empty(address.into()))
 }
 
-/// Runs one request against its deadline. While the clock is held the deadline does not come nearer.
+/// Runs one request against its deadline: an 'off' that waits brings it nearer, a held clock does not.
 fn within<T>(
     (runtime, clock): (&Runtime, &Clock),
-    limit_ms: u32,
+    (limit_ms, hurry): (u32, &Hurry),
     request: impl Future<Output = T>,
 ) -> Result<T, Ended> {
-    let deadline = clock.now().plus(Nanos(u64::from(limit_ms) * 1_000_000));
+    let by = |limit_ms: u32| clock.now().plus(Nanos(u64::from(limit_ms) * 1_000_000));
+    let mut deadline = by(limit_ms);
     runtime.block_on(async {
         let mut request = std::pin::pin!(request);
         loop {
-            let left = Duration::from_nanos(deadline.since(clock.now()).0).min(POLL_EVERY);
+            deadline = deadline.min(by(hurry.limit_ms(limit_ms)));
+            let left = Duration::from_nanos(deadline.since(clock.now()).0).min(LOOK_EVERY);
             if let Ok(answer) = tokio::time::timeout(left, request.as_mut()).await {
                 return Ok(answer);
             }
             if deadline <= clock.now() {
-                return Err(Ended::Timeout(limit_ms));
+                return Err(Ended::Timeout(hurry.limit_ms(limit_ms)));
             }
         }
     })
@@ -85,6 +86,7 @@ pub struct Tcp<'a> {
     runtime: (&'a Runtime, &'a Clock),
     context: Context,
     answer_ms: u32,
+    pub(crate) hurry: Hurry,
 }
 
 impl<'a> Tcp<'a> {
@@ -99,7 +101,8 @@ impl<'a> Tcp<'a> {
         connect_ms: u32,
         answer_ms: u32,
     ) -> Result<Self, Ended> {
-        let context = within(runtime, connect_ms, async move {
+        let hurry = Hurry::default();
+        let context = within(runtime, (connect_ms, &hurry), async move {
             let stream = tokio::net::TcpStream::connect(address).await?;
             stream.set_nodelay(true)?;
             // When the connection is dropped, what the kernel still holds is discarded: a command
@@ -109,7 +112,7 @@ impl<'a> Tcp<'a> {
             Ok(tcp::attach_slave(traced, Slave(unit)))
         })?
         .map_err(|error: std::io::Error| Ended::from(error))?;
-        Ok(Tcp { runtime, context, answer_ms })
+        Ok(Tcp { runtime, context, answer_ms, hurry })
     }
 }
 
@@ -157,7 +160,7 @@ fn part<T>(answer: Result<tokio_modbus::Result<T>, Ended>) -> Result<T, Trouble>
 
 impl Registers for Tcp<'_> {
     fn read(&mut self, table: Table, address: u16, count: u16) -> Result<Vec<u8>, Trouble> {
-        let (runtime, limit, wire) = (self.runtime, self.answer_ms, &mut self.context);
+        let (runtime, limit, wire) = (self.runtime, (self.answer_ms, &self.hurry), &mut self.context);
         let bits = |bits: Vec<bool>| bits.into_iter().map(u16::from).collect();
         let registers: Vec<u16> = match table {
             Table::Holding => part(within(runtime, limit, wire.read_holding_registers(address, count)))?,
@@ -169,7 +172,7 @@ impl Registers for Tcp<'_> {
     }
 
     fn write(&mut self, table: Table, address: u16, registers: &[u16]) -> Result<(), Trouble> {
-        let (runtime, limit) = (self.runtime, self.answer_ms);
+        let (runtime, limit) = (self.runtime, (self.answer_ms, &self.hurry));
         if table.is_bits() {
             let coils: Vec<bool> = registers.iter().map(|register| *register != 0).collect();
             return part(within(runtime, limit, self.context.write_multiple_coils(address, &coils)));

@@ -1,6 +1,7 @@
 //! Serial lines.
 
 use super::ended::Ended;
+use super::off::Hurry;
 use super::trace;
 use serialport::{DataBits, Parity, SerialPort, StopBits};
 use std::io::{Read, Write};
@@ -67,16 +68,18 @@ impl Line {
         Ok(())
     }
 
-    /// Throws away what comes until the line has been silent for `quiet`; gives up after `most`.
-    /// Returns whether it fell silent.
+    /// Throws away what comes until the line has been silent for `quiet`; gives up after `most`, or for
+    /// an 'off' that waits. Returns whether it fell silent.
     ///
     /// # Errors
     /// Where the port is gone.
-    pub fn drain(&mut self, quiet: Duration, most: Duration) -> Result<bool, Ended> {
-        let end = Instant::now() + most;
+    pub fn drain(&mut self, quiet: Duration, most: Duration, hurry: &Hurry) -> Result<bool, Ended> {
+        let (mut silent, mut end) = (Instant::now() + quiet, Instant::now() + most);
         let mut buffer = [0; 512];
         while Instant::now() < end {
-            if self.read(&mut buffer, Instant::now() + quiet)? == 0 {
+            if self.read(&mut buffer, hurry.look(&mut end).min(silent))? > 0 {
+                silent = Instant::now() + quiet;
+            } else if Instant::now() >= silent {
                 return Ok(true);
             }
         }

@@ -162,15 +162,15 @@ impl Talk {
     /// The next line, without its end, that is no unsolicited one.
     fn line(&mut self, session: &mut Session) -> Result<String, Ended> {
         let end = self.link.rx_end().to_owned().into_bytes();
-        let deadline = Instant::now() + self.limit();
+        let mut deadline = Instant::now() + self.limit();
         loop {
             self.unasked(session);
             if let Some(line) = first_line(&mut self.came, &end)? {
                 return Ok(String::from_utf8_lossy(&line).trim().to_string());
             }
-            if !self.take(deadline)? && Instant::now() >= deadline {
+            if !self.take(session.hurry.look(&mut deadline))? && Instant::now() >= deadline {
                 return Err(match self.came.is_empty() {
-                    true => Ended::Timeout(self.patience_ms),
+                    true => Ended::Timeout(session.hurry.limit_ms(self.patience_ms)),
                     false => Ended::Cut(remedy::unended(&self.came, &end, &self.request)),
                 });
             }
@@ -180,13 +180,13 @@ impl Talk {
     /// A binary answer, framed by its length; `None` where more came than that: a line that came
     /// unasked may then stand in the middle of it.
     fn block(&mut self, session: &mut Session, length: usize) -> Result<Option<Vec<u8>>, Ended> {
-        let deadline = Instant::now() + self.limit();
+        let mut deadline = Instant::now() + self.limit();
         loop {
             self.unasked(session);
             if self.came.len() < length {
-                if !self.take(deadline)? && Instant::now() >= deadline {
+                if !self.take(session.hurry.look(&mut deadline))? && Instant::now() >= deadline {
                     return Err(match self.came.len() {
-                        0 => Ended::Timeout(self.patience_ms),
+                        0 => Ended::Timeout(session.hurry.limit_ms(self.patience_ms)),
                         n => Ended::Cut(format!(
                             "{n} bytes came in place of {length}: {}",
                             remedy::shown(&self.came)
@@ -407,4 +407,30 @@ impl OffWay for Talk {
 
 fn queries(session: &Session) -> Vec<(FrameId, Query)> {
     session.endpoint.profile().queries().map(|(frame, query)| (frame, query.clone())).collect()
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::endpoint::tests::{DriveSetPoint, amplifier, on};
+    use std::net::{TcpListener, TcpStream};
+
+    #[test]
+    fn an_off_that_waits_ends_a_question() {
+        let listener = TcpListener::bind("127.0.0.1:0").unwrap();
+        let address = listener.local_addr().unwrap();
+        let (endpoint, mut port) = amplifier();
+        let (ready, _opened) = std::sync::mpsc::sync_channel(1);
+        let mut session = Session::new(endpoint, Instant::now(), std::sync::Arc::default(), ready);
+        port.push(on(1, u64::MAX));
+        session.endpoint.due(session.now());
+        port.push(DriveSetPoint { enable: false, ..on(2, u64::MAX) });
+        let mut link = session.endpoint.profile().description.link.clone();
+        link.response_timeout_ms = 3_600_000;
+        let transport = Transport::Tcp(TcpStream::connect(address).unwrap(), String::new());
+        let mut talk = Talk::new(transport, link);
+        let cut = Err(Ended::Timeout(off::OFF_WAITS_MS));
+        assert_eq!(talk.line(&mut session), cut);
+        assert_eq!(talk.block(&mut session, 4).map(|_| String::new()), cut);
+    }
 }

@@ -72,6 +72,16 @@ fn each_wrong_profile_is_refused_with_place_and_cause() {
             "`nr`",
         ),
         ("a serial format", changed(RTU, "\"8N1\"", "\"9X7\""), "9X7"),
+        (
+            "no time to answer",
+            changed(RTU, "response_timeout_ms = 200", "response_timeout_ms = 0"),
+            "at least 1",
+        ),
+        (
+            "an 'off' that is sent again after 5 s",
+            changed(AMPLIFIER, "response_timeout_ms = 50", "response_timeout_ms = 5000"),
+            "at most 2000",
+        ),
         ("no baud", changed(RTU, "baud = 19200", "baud = 0"), "no bits"),
         (
             "polls on a CAN bus",

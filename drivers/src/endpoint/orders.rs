@@ -7,10 +7,13 @@
 use super::{ALARM_HOLDS, Endpoint, Part};
 use crate::Role;
 use crate::mailbox::Mailbox;
+use crate::off::Hurry;
 use crate::ports::SetPoint;
 use instruments::{Profile, SetId};
 use realtime::ports::{Nanos, NoData};
 use ringbuf::traits::Producer;
+use std::sync::Arc;
+use std::sync::atomic::AtomicBool;
 
 /// Set-points that switch an output off leave before all others, in this order.
 const OFF_FIRST: [&str; 3] = ["enable", "velocity", "amplitude"];
@@ -140,6 +143,7 @@ impl Endpoint {
                 }
                 self.orders.driven |= on;
                 self.orders.off_sent = if on { None } else { Some(now) };
+                self.orders.commands.handed_out(on);
                 self.health.count(&self.health.commands_sent);
                 Due::SetPoints(set_points)
             }
@@ -184,6 +188,7 @@ impl Endpoint {
         self.orders.off_sent = Some(now);
         self.orders.refused = false;
         let _ = self.orders.commands.take_off();
+        self.orders.commands.handed_out(false);
         self.health.count(&self.health.safe_sent);
         self.safe_set_points()
     }
@@ -197,6 +202,11 @@ impl Endpoint {
             self.orders.wanted = None;
             self.alarm_until = self.arrived.plus(ALARM_HOLDS);
         }
+    }
+
+    /// What tells who waits for an answer that an 'off' waits, or that `stop` was set.
+    pub(crate) fn hurry(&self, stop: &Arc<AtomicBool>) -> Hurry {
+        Hurry { commands: self.orders.commands.clone(), stop: Arc::clone(stop) }
     }
 
     /// What the instrument is to the rig.

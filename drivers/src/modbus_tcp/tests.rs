@@ -2,7 +2,8 @@
 
 use super::*;
 use crate::endpoint::Endpoint;
-use crate::endpoint::tests::{amplifier, on, state};
+use crate::endpoint::tests::{DriveSetPoint, on, state};
+use crate::ports::AmplifierPort;
 use std::io::{Read, Write};
 use std::net::{TcpListener, TcpStream};
 use std::sync::atomic::{AtomicBool, Ordering};
@@ -18,6 +19,7 @@ const PATIENCE: Duration = Duration::from_secs(120);
 enum Frame {
     State(usize),
     Write(usize, u16, Vec<u16>),
+    Unanswered,
 }
 
 /// How the instrument behaves.
@@ -25,6 +27,8 @@ enum Frame {
 struct Ways {
     /// It takes no block that switches off, and not the output's own register either.
     refuses_output: AtomicBool,
+    /// It answers no question for a state.
+    silent: AtomicBool,
     /// It cuts its connection, once.
     cuts: AtomicBool,
     /// Its output, and how many states it has given.
@@ -42,6 +46,10 @@ fn serve(mut stream: TcpStream, number: usize, ways: &Ways, frames: &Sender<Fram
             return Ok(());
         }
         let mut answer = vec![head[7]];
+        if head[7] == 3 && ways.silent.load(Ordering::SeqCst) {
+            let _ = frames.send(Frame::Unanswered);
+            continue;
+        }
         if head[7] == 3 {
             let _ = frames.send(Frame::State(number));
             let mut output = ways.output.lock().unwrap();
@@ -86,12 +94,15 @@ fn instrument() -> (String, Arc<Ways>, Receiver<Frame>) {
     (address, ways, requests)
 }
 
-/// The driver of that instrument, driving. Requests from the first 'on' on stay in `requests`.
+/// The driver of that instrument, driving; answers may take an hour. Requests from the first 'on' on stay in
+/// `requests`.
 fn driving(
     address: &str,
     requests: &Receiver<Frame>,
-) -> (JoinHandle<Closed>, Arc<AtomicBool>, impl Sized + use<>) {
-    let (endpoint, mut port): (Endpoint, _) = amplifier();
+) -> (JoinHandle<Closed>, Arc<AtomicBool>, AmplifierPort) {
+    let mut profile = crate::profile("muprime-amplifier").unwrap();
+    profile.description.link.response_timeout_ms = 3_600_000;
+    let (endpoint, mut port) = Endpoint::amplifier(profile, &InstrumentSetup::new("", "")).unwrap();
     let (ready, opened) = sync_channel(1);
     let stop = Arc::<AtomicBool>::default();
     let session = Session::new(endpoint, Instant::now(), Arc::clone(&stop), ready);
@@ -151,4 +162,24 @@ fn a_new_connection_begins_with_off() {
     stop.store(true, Ordering::Release);
     assert_eq!(thread.join().unwrap(), Closed::ReadBackOff);
     drop(port);
+}
+
+/// An amplifier takes its set-points and answers no question: 'off' waited as long as an answer may take.
+#[test]
+fn an_off_waits_for_no_answer_that_stays_away() {
+    for by_stop in [false, true] {
+        let (address, ways, requests) = instrument();
+        let (thread, stop, mut port) = driving(&address, &requests);
+        ways.silent.store(true, Ordering::SeqCst);
+        while requests.recv_timeout(PATIENCE).unwrap() != Frame::Unanswered {}
+        ways.silent.store(false, Ordering::SeqCst);
+        match by_stop {
+            true => stop.store(true, Ordering::Release),
+            false => port.push(DriveSetPoint { enable: false, ..on(2, u64::MAX) }),
+        }
+        let first = requests.recv_timeout(PATIENCE).expect("'off' waits for the answer");
+        assert!(matches!(&first, Frame::Write(2, 100, registers) if registers[3] == 0), "{first:?}");
+        stop.store(true, Ordering::Release);
+        assert_eq!(thread.join().unwrap(), Closed::ReadBackOff);
+    }
 }

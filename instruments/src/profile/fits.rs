@@ -38,6 +38,8 @@ const COMMANDED: &[(Role, &[&str])] = &[
     (Role::AmbientChamber, &["pressure", "temperature", "humidity"]),
 ];
 
+/// Longest `response_timeout_ms` of what can be switched off: a link tries two seconds to do so.
+const LONGEST_ANSWER_MS: u32 = 2000;
 /// Most samples per second.
 const FASTEST_HZ: f64 = 20_000.0;
 
@@ -66,6 +68,14 @@ impl Compiler<'_> {
                 "`format`: `{format}` is none; data bits 7 or 8, parity N, E or O, stop bits 1 or 2, as 8N1"
             );
             return wrong_link(&problem);
+        }
+        let switches_off = self.description.set.iter().any(|set| set.safe.is_some());
+        if link.response_timeout_ms == 0 || (switches_off && link.response_timeout_ms > LONGEST_ANSWER_MS) {
+            return wrong_link(&format!(
+                "`response_timeout_ms` = {}: at least 1 is needed, and at most {LONGEST_ANSWER_MS} for an \
+                 instrument with `safe` set-points: an 'off' without an answer is sent again after this time",
+                link.response_timeout_ms
+            ));
         }
         if link.baud == Some(0) || link.bitrate == Some(0) {
             return wrong_link("a line of no bits per second carries nothing");

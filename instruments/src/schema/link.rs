@@ -74,7 +74,8 @@ pub struct Link {
     /// A connection must stand within this time, in ms.
     #[serde(default = "connect_timeout_ms")]
     pub connect_timeout_ms: u32,
-    /// An answer must be complete within this time, in ms; afterwards the connection is dropped.
+    /// An answer must be complete within this time, in ms, from 1 on; afterwards the connection is dropped.
+    /// At most 2000 with `safe` set-points. An 'off' that waits cuts it to 100.
     #[serde(default = "response_timeout_ms")]
     pub response_timeout_ms: u32,
     /// First pause before a new connection, in ms; it doubles up to `backoff_longest_ms`.
