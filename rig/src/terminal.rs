@@ -14,6 +14,12 @@ use std::sync::mpsc::channel;
 use std::sync::{Mutex, Once, PoisonError};
 use std::time::Duration;
 
+/// The signals that ask for a stop: none of them ends a program that drives a rig before it is off.
+pub const STOPS: [i32; 4] = {
+    use signal_hook::consts::{SIGHUP, SIGINT, SIGQUIT, SIGTERM};
+    [SIGINT, SIGTERM, SIGHUP, SIGQUIT]
+};
+
 /// The other screen, and back to the one that was there before: no attributes, the cursor shown.
 pub(crate) const ENTER: &[u8] = b"\x1b[?1049h\x1b[?25l\x1b[2J";
 const LEAVE: &[u8] = b"\x1b[0m\x1b[?25h\x1b[?1049l";

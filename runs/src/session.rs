@@ -217,7 +217,7 @@ pub enum Unfinished {
 /// The requests to a run from outside.
 #[derive(Clone, Debug, Default)]
 pub struct Signals {
-    /// Number of stop requests: SIGINT, SIGTERM, SIGHUP, or somebody who watches.
+    /// Number of stop requests: SIGINT, SIGTERM, SIGHUP, SIGQUIT, or somebody who watches.
     pub stops: Arc<AtomicUsize>,
     /// Whether the sweep is to rest before its next pass. In virtual time nothing waits.
     pub paused: Arc<AtomicBool>,

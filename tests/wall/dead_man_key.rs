@@ -283,6 +283,7 @@ fn the_terminal_is_given_back_whatever_ends_the_run() {
             ("terminated", &[libc::SIGTERM][..]),
             ("hurried", &[libc::SIGINT, libc::SIGINT][..]),
             ("hung-up", &[libc::SIGHUP][..]),
+            ("quit", &[libc::SIGQUIT][..]),
         ] {
             unless_the_machine_stalls(|n| {
                 let rig = ServedRig::of("virtual-relay", 1, None);

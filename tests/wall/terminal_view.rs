@@ -190,11 +190,11 @@ fn a_run_is_seen_paused_and_resumed_from_two_terminals() {
     });
 }
 
-/// One key stops, from the run's own view and from another process's; SIGTERM and SIGHUP give the terminal back; a terminal whose window
-/// is closed, which sends a SIGHUP and takes nothing any more, ends the run as a stop does: drive off, passes kept.
+/// One key stops, from the run's own view and from another process's; SIGTERM, SIGHUP and SIGQUIT give the
+/// terminal back; a terminal whose window is closed, which sends a SIGHUP and takes nothing any more, ends the run as a stop does: drive off, passes kept.
 #[test]
 fn one_key_stops_and_signals_give_the_terminal_back() {
-    for how in ["own s", "own Ctrl-C", "other s", "SIGTERM", "SIGHUP", "closed"] {
+    for how in ["own s", "own Ctrl-C", "other s", "SIGTERM", "SIGHUP", "SIGQUIT", "closed"] {
         let folder = tempfile::tempdir().unwrap();
         let rig = ServedRig::start(3, None);
         let (plan, file) = files(folder.path(), &rig);

@@ -350,11 +350,10 @@ fn folder(named: Option<PathBuf>, plan: &str) -> miette::Result<(PathBuf, Made)>
     Ok((path, made))
 }
 
-/// SIGINT, SIGTERM and SIGHUP ask for a stop; a second one leaves within two seconds whatever happens.
+/// Each of [`rig::terminal::STOPS`] asks for a stop; a second one leaves within two seconds whatever happens.
 fn watch_signals(signals: &Signals) -> miette::Result<()> {
-    use signal_hook::consts::{SIGHUP, SIGINT, SIGTERM};
     let (stops, mut is_first) = (Arc::clone(&signals.stops), true);
-    studies::progress::on_signals(&[SIGINT, SIGTERM, SIGHUP], move || {
+    studies::progress::on_signals(&rig::terminal::STOPS, move || {
         stops.fetch_add(1, Ordering::Relaxed);
         if std::mem::take(&mut is_first) {
             return;
@@ -421,10 +420,13 @@ fn tell(summary: &Summary, json: bool) {
     }
     let tripped = matches!(summary.outcome, Outcome::Tripped(_));
     for (name, link) in &summary.links {
-        let fault = link["fault"].as_str().filter(|fault| tripped && !fault.is_empty()).unwrap_or_default();
+        let of_a_trip = |key: &str| link[key].as_str().filter(|text| tripped && !text.is_empty());
+        let fault = of_a_trip("fault").unwrap_or_default();
         if !fault.is_empty() {
             report!("`{name}` reports: {fault}");
         }
+        // A trip for want of data does not say why there was none.
+        of_a_trip("last_problem").iter().for_each(|last| report!("last problem of `{name}`: {last}"));
         let reported = link["reported"].as_object().into_iter().flatten();
         for (text, times) in reported.filter(|(text, _)| !fault.starts_with(*text)) {
             report!("`{name}` reported {times} x: {text}");

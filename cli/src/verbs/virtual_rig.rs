@@ -94,9 +94,7 @@ pub fn run(args: Args, json: bool) -> miette::Result<ExitCode> {
             .spawn(move || at_the_bench(&hands, &plant))
             .into_diagnostic()?;
     }
-    let mut signals =
-        signal_hook::iterator::Signals::new([signal_hook::consts::SIGINT, signal_hook::consts::SIGTERM])
-            .into_diagnostic()?;
+    let mut signals = signal_hook::iterator::Signals::new(rig::terminal::STOPS).into_diagnostic()?;
     let _ = signals.forever().next();
     drop((line, emulators, served));
     exit(DONE)

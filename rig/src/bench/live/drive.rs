@@ -11,7 +11,6 @@ use realtime::turn::{Ports, Row};
 use runs::session::Unfinished;
 use runs::setup::Setup;
 use runs::supervisor::{Loop, OffReport};
-use signal_hook::consts::{SIGHUP, SIGINT, SIGTERM};
 use std::sync::atomic::{AtomicBool, Ordering};
 use std::sync::{Arc, Mutex, PoisonError};
 use std::thread::JoinHandle;
@@ -51,7 +50,7 @@ impl Drive {
         let origin_ns = pacing::monotonic_ns();
         let model = SpringSlider::new(setup.tip.finger).map_err(|e| miette::miette!("{e}"))?;
         let interrupted = Arc::new(AtomicBool::new(false));
-        for signal in [SIGINT, SIGTERM, SIGHUP] {
+        for signal in crate::terminal::STOPS {
             signal_hook::flag::register(signal, Arc::clone(&interrupted)).into_diagnostic()?;
         }
         let rig = drivers::open(&setup.instruments(), epoch).map_err(|e| miette::miette!("{e}"))?;
