@@ -3,12 +3,14 @@
 
 use models::prediction::SpringSlider;
 use models::quantity::PeakToPeak;
-use realtime::cycle::{Command, KEY_AGE, Marker};
-use realtime::ports::{Contacts, Nanos, NoData, SafetyInputs};
+use realtime::cycle::{Command, KEY_AGE, Marker, Phase};
+use realtime::ports::{Contacts, ForceSensor, Forces, Nanos, NoData, SafetyInputs};
 use realtime::safety::{Cause, Request};
 use realtime::turn::{Ports, Row};
+use runs::plan::{Plan, Resolution};
+use runs::sequence::{Event, MeasuredPass, Outcome, Sequence};
 use runs::setup::Setup;
-use runs::supervisor::{Loop, VirtualLoop};
+use runs::supervisor::{self, Loop, Requests, VirtualLoop};
 use sim::defects::Defects;
 use sim::virtual_rig::VirtualRig;
 use sim::world::WorldConfig;
@@ -118,5 +120,101 @@ fn off_is_said_of_what_was_read_back_off_alone() {
         let report = rig.end(&mut |_| {});
         assert_eq!(report.read_back, off, "{report:?}");
         assert_eq!(report.words().contains("may still be on: switch the supply off"), !off, "{report:?}");
+    }
+}
+
+const TEN_PASSES: &str = "name = \"p\"\nseed = 3\nreference_every = 0\n[pass]\nsettle_s = 0.05\nmeasure_s = 0.05\n[base]\n\
+    amplitude_pp_m = 2e-6\nfrequency_hz = 27500\nspeed_m_s = 0.02\nnormal_force_n = 0.25\n[[series]]\n\
+    amplitude_pp_m = [2e-6, 1e-6, 2.5e-6, 3e-6, 1.5e-6]\n";
+
+/// A force sensor whose lateral raw value stands still for a while, and whose count goes on.
+struct Stuck<F> {
+    force: F,
+    from_to: [f64; 2],
+    shown: Option<(i64, f64)>,
+}
+
+impl<F: ForceSensor> ForceSensor for Stuck<F> {
+    fn read(&mut self, now: Nanos) -> Forces {
+        let mut forces = self.force.read(now);
+        if let Ok(lateral) = &mut forces.lateral {
+            let stands = now.seconds() >= self.from_to[0] && now.seconds() < self.from_to[1];
+            let (raw, value) = *self.shown.filter(|_| stands).get_or_insert((lateral.raw, lateral.value));
+            self.shown = Some((raw, value));
+            (lateral.raw, lateral.value) = (raw, value);
+        }
+        forces
+    }
+}
+
+/// Passes, events, when each point was measured, and the outcome, of a sweep with a sensor that stands still.
+fn stuck(from_to: [f64; 2], frozen_after: u32) -> (Vec<MeasuredPass>, Vec<Event>, Vec<(u32, f64)>, Outcome) {
+    let mut setup = Setup::load("virtual-ideal").unwrap();
+    setup.config.limits.frozen_after = frozen_after;
+    let plan = Plan::parse("plan.toml", TEN_PASSES).unwrap();
+    let resolution = Resolution { amplitude_pp_m: 1e-9, frequency_hz: 0.1 };
+    let points = plan.points(1, &setup.config.limits, &resolution).unwrap();
+    let model: Arc<dyn models::prediction::FrictionModel> =
+        Arc::new(SpringSlider::new(setup.tip.finger).unwrap());
+    let noise = setup.file.noise;
+    let mut sequence = Sequence::new(points, plan.file.pass, Arc::clone(&model), &setup.tip, noise);
+    let [force, amplifier, stage] = VirtualRig::new(&WorldConfig::ideal(), 1).unwrap().split();
+    let force = Stuck { force, from_to, shown: None };
+    let ports = Ports::new(Box::new(force), Box::new(amplifier), Box::new(stage));
+    let mut rig = VirtualLoop::new(setup.config, model, ports);
+    let (mut passes, mut events, mut measured) = (Vec::new(), Vec::new(), Vec::new());
+    let outcome =
+        supervisor::sweep(&mut rig, &mut sequence, &mut Requests::default, &mut |row, _, reaction| {
+            if row.marker.phase == Phase::Measure {
+                measured.push((row.marker.point, row.now.seconds()));
+            }
+            passes.extend(reaction.pass);
+            events.extend(reaction.events);
+        });
+    (passes, events, measured, outcome)
+}
+
+/// A sensor dies in a pass: neither that pass nor a later one counts, whether a trip follows or not.
+#[test]
+fn a_pass_with_a_sensor_that_stands_still_does_not_count() {
+    let (plain, _, measured, outcome) = stuck([f64::MAX; 2], 50);
+    assert_eq!((plain.len(), outcome), (10, Outcome::Complete));
+    let third = u32::try_from(plain[3].pass.point).unwrap();
+    let ends = measured.iter().rfind(|(point, _)| *point == third).unwrap().1;
+
+    let (passes, events, _, outcome) = stuck([ends - 0.02, f64::MAX], 50);
+    assert!(matches!(outcome, Outcome::Tripped(trip) if trip.cause == Cause::LateralFrozen), "{outcome:?}");
+    assert_eq!(passes.len(), 3, "the pass in which it died counts");
+    let cause = Some(Cause::LateralFrozen);
+    assert!(events.contains(&Event::PassRepeated { point: third, cause }), "{events:?}");
+
+    // No trip: it lives again before so many samples.
+    let (passes, events, _, outcome) = stuck([ends - 0.02, ends + 0.1], 1000);
+    assert_eq!((passes.len(), outcome), (10, Outcome::Complete));
+    assert!(passes.iter().all(|p| p.pass.lateral_force_sd_n.is_some_and(|sd| sd > 0.0)));
+    assert!(events.iter().any(|e| matches!(e, Event::PassRepeated { cause: Some(_), .. })), "{events:?}");
+
+    // It stays dead, and no rule notices: the sweep gives up.
+    let (passes, _, _, outcome) = stuck([ends - 0.02, f64::MAX], u32::MAX);
+    assert!(matches!(outcome, Outcome::Frozen { cause: Cause::LateralFrozen, .. }), "{outcome:?}");
+    assert_eq!(passes.len(), 3);
+}
+
+#[test]
+fn a_frozen_sensor_is_noticed_within_its_time() {
+    let (profile, limits) = ("profile = \"muprime-force2\"", "[limits]\nfrozen_after");
+    let stated = |rate: &str, n: u32| {
+        let text = Setup::load("virtual-ideal").unwrap().text;
+        let text = text.replacen(profile, &format!("{profile}\nrate_hz = {rate}"), 1);
+        let text = match text.contains("[limits]\n") {
+            true => text.replacen("[limits]\n", &format!("{limits} = {n}\n"), 1),
+            false => format!("{text}\n{limits} = {n}\n"),
+        };
+        Setup::parse("changed", &text, Path::new(".")).err().map(|e| format!("{e:?}"))
+    };
+    for (rate, n, good) in [("20", 50, true), ("40", 100, true), ("40", 101, false), ("1000", 1000, true)] {
+        let problem = stated(rate, n);
+        assert_eq!(problem.is_none(), good, "{rate} {n}: {problem:?}");
+        assert!(problem.is_none_or(|why| why.contains("20 to 100")), "{rate} {n}");
     }
 }

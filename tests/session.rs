@@ -128,7 +128,7 @@ fn a_trip_is_told_with_its_unit_and_its_remedy() {
     let remedy = realtime::safety::Cause::NormalOverforce.remedy();
     let trip = stderr.lines().find(|line| line.starts_with("STOPPED for safety: ")).unwrap_or_default();
     assert!(
-        trip.contains("the normal force is above its limit: 0.25") && trip.contains("[SR-04]"),
+        trip.contains("the normal force is beyond its limit: 0.25") && trip.contains("[SR-04]"),
         "{stderr}"
     );
     assert!(trip.contains(" N (limit 0.25 N), at ") && stderr.contains(remedy), "{stderr}");

@@ -82,7 +82,7 @@ const QUIET_WITHIN: Nanos = Nanos(2_500_000_000);
 /// it).
 const STANDS_M_S: f64 = 2e-3;
 const LIFTED_N: f64 = 0.3;
-/// A pass without contact is made again so often before the sweep gives up.
+/// A pass without contact, or with a frozen sensor, is made again so often before the sweep gives up.
 const TRIES: u32 = 3;
 
 /// How a start position is approached: velocity in proportion to the way that is left.
@@ -139,6 +139,7 @@ pub struct Sequence {
     pub(crate) guards: Guards,
     exposure_left: Option<Left>,
     load_commanded: bool,
+    frozen_after: u32,
     /// The longest pause.
     pub(crate) pause_max: Nanos,
     /// The stop of a pause is on its way: the trip that shows it ends nothing.
@@ -184,6 +185,7 @@ impl Sequence {
             guards: Guards::default(),
             exposure_left: None,
             load_commanded: true,
+            frozen_after: 50,
             pause_max: Nanos::from_seconds(PAUSE_MAX_S),
             pausing: false,
             session: None,
@@ -197,6 +199,7 @@ impl Sequence {
             has_watchdog: limits.amplifier_watchdog || limits.supply_watchdog,
             arming: self.arming.guarded_by(limits),
             load_commanded: limits.load_commanded,
+            frozen_after: limits.frozen_after,
             approach: Approach::at(limits.timing.cycle, &limits.timing.stage),
             ..self
         }

@@ -70,18 +70,17 @@ impl Compiler<'_> {
             return wrong_link(&problem);
         }
         let switches_off = self.description.set.iter().any(|set| set.safe.is_some());
-        if link.response_timeout_ms == 0 || (switches_off && link.response_timeout_ms > LONGEST_ANSWER_MS) {
+        if link.response_timeout_ms == 0 || link.connect_timeout_ms == 0 {
+            return wrong_link("`response_timeout_ms` and `connect_timeout_ms` are above zero");
+        }
+        if switches_off && link.response_timeout_ms > LONGEST_ANSWER_MS {
             return wrong_link(&format!(
-                "`response_timeout_ms` = {}: at least 1 is needed, and at most {LONGEST_ANSWER_MS} for an \
-                 instrument with `safe` set-points: an 'off' without an answer is sent again after this time",
-                link.response_timeout_ms
+                "`response_timeout_ms` is at most {LONGEST_ANSWER_MS} with `safe` set-points: an 'off' without an \
+                 answer is sent again after this time"
             ));
         }
         if link.baud == Some(0) || link.bitrate == Some(0) {
             return wrong_link("a line of no bits per second carries nothing");
-        }
-        if link.response_timeout_ms == 0 || link.connect_timeout_ms == 0 {
-            return wrong_link("`response_timeout_ms` and `connect_timeout_ms` are above zero");
         }
         let serial = matches!(link.kind, LinkKind::ModbusRtu | LinkKind::Serial);
         if serial && (link.baud.is_none() || link.format.is_none()) {

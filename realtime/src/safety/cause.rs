@@ -53,8 +53,8 @@ causes! {
     DeadMan "the dead-man device was released" => "Release the dead-man device, grip it again, and start the run again.";
     /// Vibration on a human finger lasted too long.
     Exposure "vibration on the finger lasted too long without a rest" => "Take the finger off and rest as long as `exposure_rest_s` says; plan shorter passes.";
-    NormalOverforce "the normal force is above its limit" => "Lift the finger off and check load, stage and sensor before it is loaded again.";
-    LateralOverforce "the lateral force is above its limit" => "Look for what holds the finger or the plate; ask for a smaller load.";
+    NormalOverforce "the normal force is beyond its limit" => "Lift the finger off and check load, stage and sensor before it is loaded again.";
+    LateralOverforce "the lateral force is beyond its limit" => "Look for what holds the finger or the plate; ask for a smaller load.";
     ForceRate "the normal force changes too fast" => "Look for a blow or a loose sensor; load more slowly.";
     /// A lateral sample is older than its age limit, or there is none.
     LateralStale "the lateral force sensor sends no fresh samples" => FORCE_LINK;

@@ -91,11 +91,11 @@ rules! {
     "SR-36" Interlock [Flag, Second] "An open, silent or broken interlock switches off." => |c| contact_open(c, &c.seen.contacts.interlock);
     "SR-02" DeadMan [Flag] "With a human finger, releasing the dead-man input switches off; it must be seen released, then held, before arming." => dead_man;
     "SR-03" Exposure [Second] "With a human finger, vibration in one go lasts no longer than its limit; only a rest of full length ends a go." => exposure;
-    "SR-04" NormalOverforce [Newton] "Normal force stays below its limit." => |c| overforce(c, &c.watch.normal, c.limits.normal_force_max_n, c.limits.timing.normal.period);
+    "SR-04" NormalOverforce [Newton] "Normal force stays below its limit, either sign." => |c| overforce(c, &c.watch.normal, c.limits.normal_force_max_n, c.limits.timing.normal.period);
     "SR-05" LateralOverforce [Newton] "Lateral force stays below its limit, either sign." => |c| overforce(c, &c.watch.lateral, c.limits.lateral_force_max_n, c.limits.timing.lateral.period);
     "SR-06" ForceRate [NewtonPerSecond] "Normal force does not change faster than its limit over two samples in a row." => |c| broken(c.watch.normal.fast_in_a_row >= 2, c.watch.normal.rate_n_s.abs(), c.limits.force_rate_max_n_s);
     "SR-07" OverAmplitude [Metre] "Measured amplitude stays below its limit." => |c| above(amplitude_pp_m(c), c.limits.amplitude_max.metres());
-    "SR-08" AmplitudeRunaway [Metre] "Measured amplitude stays within 30 % (and 0.3 \u{b5}m) of what was commanded, ring-down allowed." => |c| above(amplitude_pp_m(c), 1.3 * c.watch.ringing_pp_m + 0.3e-6);
+    "SR-08" AmplitudeRunaway [Metre] "Measured amplitude exceeds what was commanded by no more than 30 % and 0.3 \u{b5}m, ring-down allowed." => |c| above(amplitude_pp_m(c), 1.3 * c.watch.ringing_pp_m + 0.3e-6);
     "SR-09" AmplitudeRate [MetrePerSecond] "Measured amplitude does not rise faster than its limit over two samples in a row." => |c| broken(c.watch.amplitude_fast_in_a_row >= 2, c.watch.amplitude_rate_m_s, c.limits.amplitude_rate_max_m_s);
     "SR-10" LateralInvalid [Count] "Three cycles without a valid lateral sample switch off." => |c| broken(c.watch.lateral.invalid_in_a_row >= 3, f64::from(c.watch.lateral.invalid_in_a_row), 3.0);
     "SR-11" NormalInvalid [Count] "Three cycles without a valid normal sample switch off." => |c| broken(c.watch.normal.invalid_in_a_row >= 3, f64::from(c.watch.normal.invalid_in_a_row), 3.0);
@@ -128,7 +128,7 @@ rules! {
     "SR-40" ExposureDose [SquareMetrePerSecond] "With a human finger, the squared velocity summed over the last hour stays below its limit." => |c| above(last_hour(c).map(|(_, dose)| dose), c.limits.exposure_dose_max_m2_s);
     "SR-41" AmplitudeSaturated [Count] "An amplitude at the end of its range in two states in a row switches off." => |c| broken(c.watch.amplitude_saturated_in_a_row >= 2, f64::from(c.watch.amplitude_saturated_in_a_row), 2.0);
     "SR-42" AmplitudeFrozen [Count] "While the plate is driven, a measured amplitude that has noise does not repeat its raw value more often than that allows." => amplitude_frozen;
-    "SR-43" LoadImplausible [Newton] "Normal force stays near the load that the stage is commanded to apply, and near zero when it is commanded to lift off." => load_plausible;
+    "SR-43" LoadImplausible [Newton] "Normal force, either sign, stays below 1.5 times the load that the stage is commanded to apply and 0.3 N, also when it is commanded to lift off." => load_plausible;
 }
 
 fn broken(is: bool, value: f64, bound: f64) -> Option<(f64, f64)> {
@@ -190,7 +190,8 @@ fn overforce(c: &Context<'_>, watch: &ForceWatch, limit: f64, period: Nanos) -> 
         .over_since
         .filter(|since| c.now.since(*since).0 >= 2 * period.0.max(c.limits.timing.cycle.0))
         .map(|_| (watch.over_value, limit));
-    above(watch.believed.map(|r| r.value.abs()), limit).or(shown)
+    // The sign tells a pull from a push.
+    watch.believed.filter(|r| r.value.abs() > limit).map(|r| (r.value, limit)).or(shown)
 }
 
 fn saturated(watch: &ForceWatch) -> Option<(f64, f64)> {

@@ -87,7 +87,7 @@ impl ForceWatch {
         if let Ok(reading) = channel {
             let over = reading.value.abs() > force_max_n;
             self.over_since = if over { self.over_since.or(Some(now)) } else { None };
-            self.over_value = reading.value.abs();
+            self.over_value = reading.value;
         }
         self.usable = false;
         self.expect(limits.timing.cycle, timing.period);

@@ -71,7 +71,10 @@ pub fn describe(event: &Event) -> String {
         Event::Resumed => "warning: resuming: the rig is armed again, then stage and plate move. Keep hands \
              off; with a finger, release the dead-man device and grip it again"
             .into(),
-        Event::PassRepeated { point } => format!("pass {point}: no contact; repeating it"),
+        Event::PassRepeated { point, cause } => {
+            let why = cause.map_or("no contact", Cause::words);
+            format!("pass {point} does not count: {why}; it is made again")
+        }
         Event::TemperatureBeyondCertificate { point, flag } => {
             format!("from pass {point}: {flag}; the passes are flagged and not corrected")
         }

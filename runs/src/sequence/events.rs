@@ -103,10 +103,13 @@ pub enum Event {
     },
     /// The pause is over: the rig is armed again, from the proof of the second channel on.
     Resumed,
-    /// A pass was started again because contact was lost.
+    /// A pass does not count and is made again: there was no contact, or a force sensor stood still.
     PassRepeated {
         /// Which.
         point: u32,
+        /// The rule of the sensor that stood still; none for lost contact.
+        #[serde(default, skip_serializing_if = "Option::is_none")]
+        cause: Option<Cause>,
     },
     /// From this pass on a certificate does not hold at the temperature that the amplifier reports, or that
     /// is not known: every pass until it holds again carries the flag.
@@ -219,6 +222,19 @@ pub enum Outcome {
     NoContact {
         /// At which point.
         point: u32,
+        /// Mean normal force in N.
+        #[serde(default, skip_serializing_if = "Option::is_none")]
+        normal_n: Option<f64>,
+        /// Least that counts as contact, in N.
+        #[serde(default, skip_serializing_if = "Option::is_none")]
+        least_n: Option<f64>,
+    },
+    /// A force sensor showed one raw value throughout a pass, again and again.
+    Frozen {
+        /// At which point.
+        point: u32,
+        /// The rule that says which.
+        cause: Cause,
     },
     /// A level of the air that the plan asks for was not reached in time.
     LevelNotReached {
@@ -242,7 +258,7 @@ impl Outcome {
     /// The cause that ended the sweep or prevented it, where a rule did.
     pub fn cause(&self) -> Option<Cause> {
         match self {
-            Outcome::Tripped(trip) => Some(trip.cause),
+            Outcome::Tripped(Trip { cause, .. }) | Outcome::Frozen { cause, .. } => Some(*cause),
             Outcome::WouldNotArm { blocking } => *blocking,
             _ => None,
         }
@@ -252,7 +268,7 @@ impl Outcome {
     pub fn remedy(&self) -> Option<&'static str> {
         match self {
             Outcome::NoContact { .. } => Some(
-                "check that the finger is lowered, the load or `dead_weight_n`, and that lateral and normal are not swapped",
+                "check that the finger is lowered, the load or `dead_weight_n`, that lateral and normal are not swapped, and the sign, unit and gain of normal",
             ),
             _ => self.cause().map(Cause::remedy),
         }
@@ -268,7 +284,11 @@ impl Outcome {
                 format!("the rig would not arm: {}", cause.words())
             }
             Outcome::WouldNotArm { blocking: None } => "the rig would not arm".into(),
-            Outcome::NoContact { point } => format!("no contact at point {point}"),
+            Outcome::NoContact { point, normal_n: Some(normal), least_n: Some(least) } => format!(
+                "no contact at point {point}: the normal force is {normal:.4} N, and at least {least:.4} N is needed"
+            ),
+            Outcome::NoContact { point, .. } => format!("no contact at point {point}"),
+            Outcome::Frozen { point, cause } => format!("no data at point {point}: {}", cause.words()),
             Outcome::LevelNotReached { quantity, wanted, found } => {
                 let at = AIR.iter().position(|(covariate, _)| covariate.name == quantity);
                 let words = |v: f64| at.map_or_else(|| format!("{quantity} {v}"), |at| shown(at, v));
@@ -313,7 +333,7 @@ mod tests {
             Event::StopRequested,
             Event::Paused { point: 1 },
             Event::Resumed,
-            Event::PassRepeated { point: 1 },
+            Event::PassRepeated { point: 1, cause: Some(cause) },
             Event::TemperatureBeyondCertificate { point: 1, flag },
             Event::TemperatureUnwatched { certificate: "c".into() },
             Event::Disarmed { supply_open: true },

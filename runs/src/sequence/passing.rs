@@ -10,9 +10,32 @@ use models::psi::PsiEq17;
 use models::quantity::PeakToPeak;
 use realtime::cycle::{Command, Phase};
 use realtime::estimate::Moments;
-use realtime::ports::Nanos;
-use realtime::safety::Request;
+use realtime::ports::{Channel, Nanos};
+use realtime::safety::{Cause, Request};
 use realtime::turn::Row;
+
+/// A channel that ends a pass with one raw value, for a tenth of `frozen_after` and a quarter of the pass, is no data.
+const FROZEN_SHARES: [u32; 2] = [10, 4];
+
+/// Raw values of a channel in a pass: the last, how many in a row are equal to it, and how many there are.
+#[derive(Clone, Copy, Debug, Default)]
+struct Raw {
+    last: Option<(u32, i64)>,
+    equal: u32,
+    samples: u32,
+}
+
+impl Raw {
+    fn take(&mut self, channel: &Channel) {
+        let Ok(reading) = channel else { return };
+        if self.last.is_some_and(|(sequence, _)| sequence == reading.sequence) {
+            return;
+        }
+        self.equal = if self.last.is_some_and(|(_, raw)| raw == reading.raw) { self.equal + 1 } else { 1 };
+        self.samples += 1;
+        self.last = Some((reading.sequence, reading.raw));
+    }
+}
 
 /// Sums over the steady part of a pass.
 #[derive(Clone, Copy, Debug, Default)]
@@ -24,6 +47,8 @@ pub(super) struct Sums {
     position: Moments,
     temperature: Moments,
     lateral_sequence: Option<u32>,
+    /// Of the lateral and the normal channel.
+    raw: [Raw; 2],
     frequency_hz: f64,
 }
 
@@ -44,6 +69,8 @@ impl Sequence {
     /// Adds a row's fresh samples to the sums.
     pub(super) fn take(&mut self, row: &Row) {
         let seen = &row.inputs.seen;
+        let [lateral, normal] = &mut self.sums.raw;
+        (lateral.take(&seen.forces.lateral), normal.take(&seen.forces.normal));
         if let (true, Ok(lateral), Ok(normal)) = (row.usable, &seen.forces.lateral, &seen.forces.normal)
             && self.sums.lateral_sequence != Some(lateral.sequence)
         {
@@ -76,15 +103,18 @@ impl Sequence {
             return;
         }
         let normal = self.sums.normal.mean().unwrap_or(0.0);
-        // A pass that was never in contact says nothing about friction.
-        if normal < 0.3 * point.condition.normal_force_n {
+        // A pass that was never in contact says nothing about friction, and neither does a frozen sensor.
+        let (least, frozen) = (0.3 * point.condition.normal_force_n, self.frozen());
+        if frozen.is_some() || normal < least {
             self.tries += 1;
+            let point = point.number;
             if self.tries >= TRIES {
                 out.commands.push(Command::Stop);
-                self.finish(out, Outcome::NoContact { point: point.number });
+                let no_contact = Outcome::NoContact { point, normal_n: Some(normal), least_n: Some(least) };
+                self.finish(out, frozen.map_or(no_contact, |cause| Outcome::Frozen { point, cause }));
                 return;
             }
-            out.events.push(Event::PassRepeated { point: point.number });
+            out.events.push(Event::PassRepeated { point, cause: frozen });
             self.begin_next(row, out);
             return;
         }
@@ -112,6 +142,14 @@ impl Sequence {
         }
         out.pass = Some(measured);
         self.edges(row, since, 0, out);
+    }
+
+    /// The channel that stood still at the end of this pass.
+    fn frozen(&self) -> Option<Cause> {
+        let least =
+            |raw: &Raw| self.frozen_after.div_ceil(FROZEN_SHARES[0]).max(raw.samples / FROZEN_SHARES[1]);
+        let mut causes = self.sums.raw.iter().zip([Cause::LateralFrozen, Cause::NormalFrozen]);
+        causes.find(|(raw, _)| raw.equal >= least(raw)).map(|(_, cause)| cause)
     }
 
     /// The edges behind a pass: off, on, off and so on, and last a turn of the stage with the drive off.

@@ -39,8 +39,8 @@ pub struct LimitsFile {
     /// Whether a temperature is read; losing one that is read is a trip. `false` only where the amplifier's
     /// profile has none, and nobody touches the plate. Default: true.
     pub temperature_fitted: Option<bool>,
-    /// Equal raw samples in a row that are a frozen channel: 20 to 1000 equal raw samples in a row. Default:
-    /// 50.
+    /// Equal raw samples in a row that are a frozen channel: 20 to 1000; above 50, at most 2.5 s of them.
+    /// Default: 50.
     pub frozen_after: Option<u32>,
     /// Equal raw amplitudes in a row that are a frozen readback: 20 to 1000, while driven. Default: 200 where
     /// the profile states the readback's noise.
@@ -73,6 +73,8 @@ pub struct LimitsFile {
 /// How long a link's thread may be held up on a machine that does nothing else, and the longest that a setup may allow.
 const LINK_STALL_S: f64 = 0.02;
 const LINK_STALL_MAX_S: f64 = 0.05;
+/// A dead force sensor is noticed within this time, in s: 50 samples at 20 a second.
+const FROZEN_MAX_S: f64 = 2.5;
 
 /// Equal amplitudes in a row that count as frozen, where the profile states that the readback has noise.
 const FROZEN_AFTER: u32 = 200;
@@ -215,6 +217,13 @@ fn of(file: &SetupFile, person: bool, cycle: Nanos) -> Result<Limits, LimitError
     if !(1.0..=3600.0).contains(&pause) {
         let needed = "from 1 to 3600: an unused rig does not wait longer";
         return Err(LimitError::Unusable { name: "pause_max_s", value: pause, needed });
+    }
+    let slowest_s = limits.timing.lateral.period.max(limits.timing.normal.period).seconds();
+    let (low, high) = (20.0, (FROZEN_MAX_S / slowest_s).round().clamp(50.0, 1000.0));
+    let (name, value) = ("frozen_after", f64::from(limits.frozen_after));
+    if value > high && value <= 1000.0 {
+        let why = "more are over 2.5 s of a dead sensor at its rate";
+        return Err(LimitError::OutOfRange { name, value, low, high, why });
     }
     limits.checked()
 }

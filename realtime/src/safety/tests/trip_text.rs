@@ -46,7 +46,8 @@ fn a_trip_is_told_in_its_unit() {
     assert_eq!(force.unit, Unit::Newton);
     let text = force.to_string();
     assert!(
-        text.starts_with("the normal force is above its limit: 40 N (limit ") && text.ends_with(" s [SR-04]"),
+        text.starts_with("the normal force is beyond its limit: 40 N (limit ")
+            && text.ends_with(" s [SR-04]"),
         "{text}"
     );
 
