@@ -154,9 +154,7 @@ fn doubted(fitted: &Fitted, none: f64, unknown: f64, probabilities: &mut [f64]) 
     let causes = coarse.each.iter().chain(&coarse.unweighed).sum::<f64>().max(f64::MIN_POSITIVE);
     let foreign = if probabilities.is_empty() { 0.0 } else { k.foreign_form * unknown };
     let stated = |p: f64, coarse: f64| mixed(p, coarse) + foreign * coarse / causes;
-    for (p, &coarse) in probabilities.iter_mut().zip(&coarse.each) {
-        *p = stated(*p, coarse);
-    }
+    probabilities.iter_mut().zip(&coarse.each).for_each(|(p, &coarse)| *p = stated(*p, coarse));
     (none, unknown - foreign, coarse.unweighed.iter().map(|&coarse| stated(0.0, coarse)).collect())
 }
 
@@ -232,10 +230,8 @@ fn departed_singles(fitted: &Fitted, leader: usize) -> Vec<usize> {
             || own.log_evidence - candidates[i].log_evidence < k.pair_own_form_nats
                 && left_by_a_form_of_its_own(fitted, &candidates[i]) < k.pair_departure.powi(2) * gap
     };
-    (0..candidates.len())
-        .filter(|&i| candidates[i].effects.len() == 1 && own.effects.contains(&candidates[i].effects[0]))
-        .filter(|&i| might(i))
-        .collect()
+    let member = |c: &Candidate| c.effects.len() == 1 && own.effects.contains(&c.effects[0]);
+    (0..candidates.len()).filter(|&i| member(&candidates[i]) && might(i)).collect()
 }
 
 /// Pairs of a leading single cause and a second one that gains too much for a companion by chance, as far as

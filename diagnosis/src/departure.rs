@@ -81,10 +81,8 @@ impl Change {
                 continue;
             }
             let Some(slope) = slope(problem, members, u, prediction, (i, freedom.bends)) else { continue };
-            let own = match members.len() {
-                1 => raw.clone(),
-                _ => prediction - without_member(problem, members, u, i),
-            };
+            let alone = members.len() == 1;
+            let own = if alone { raw.clone() } else { prediction - without_member(problem, members, u, i) };
             let own = beside_recalibration(problem, &jacobian, &own);
             let unit = norm(problem, &beside_recalibration(problem, &jacobian, &slope));
             let sd = freedom.bend * norm(problem, &own) / unit.max(1e-300);

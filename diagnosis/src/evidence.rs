@@ -206,9 +206,7 @@ pub(crate) fn equations(
     joined.set_column(d, residual);
     let all = covariance.inner(&joined, &joined);
     let mut hessian = all.view((0, 0), (d, d)).into_owned();
-    for k in 0..d {
-        hessian[(k, k)] += precision[k];
-    }
+    (0..d).for_each(|k| hessian[(k, k)] += precision[k]);
     let gradient = DVector::from_fn(d, |k, _| -all[(k, d)] + precision[k] * u[k]);
     (hessian, gradient)
 }

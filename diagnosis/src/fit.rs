@@ -84,9 +84,7 @@ impl Problem {
         let mut prior_sd = [constants.mu0_log_sd[usize::from(mu0.is_none())], sd, sd];
         for (key, e_folds) in gains_within_the_baseline() {
             let open = rig.calibration.sd(key).unwrap_or(0.0);
-            for (own, e_fold) in prior_sd.iter_mut().zip(e_folds) {
-                *own = own.hypot(e_fold * open);
-            }
+            prior_sd.iter_mut().zip(e_folds).for_each(|(own, e_fold)| *own = own.hypot(e_fold * open));
         }
         Problem {
             passes: table.passes.clone(),

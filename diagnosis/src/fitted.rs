@@ -47,13 +47,10 @@ impl Candidate {
         if log_evidence <= self.laws[at].0 {
             return;
         }
-        let gained = {
-            let sum = |laws: &[(f64, Posterior)]| log_sum_exp(&laws.iter().map(|l| l.0).collect::<Vec<_>>());
-            let before = sum(&self.laws);
-            self.laws[at] = (log_evidence, found);
-            sum(&self.laws) - before
-        };
-        self.log_evidence += gained;
+        let sum = |laws: &[(f64, Posterior)]| log_sum_exp(&laws.iter().map(|l| l.0).collect::<Vec<_>>());
+        let before = sum(&self.laws);
+        self.laws[at] = (log_evidence, found);
+        self.log_evidence += sum(&self.laws) - before;
         self.best = self.likeliest().clone();
     }
 
@@ -180,12 +177,8 @@ impl Fitted {
         let none = self.evidence[0];
         let weight =
             |effects: usize, evidence: f64| self.log_prior(effects) + (evidence - none) / k.doubt_temper;
-        let alone: BTreeMap<usize, f64> = self
-            .candidates
-            .iter()
-            .filter(|c| c.effects.len() == 1)
-            .map(|c| (c.effects[0], c.log_evidence))
-            .collect();
+        let singles = self.candidates.iter().filter(|c| c.effects.len() == 1);
+        let alone: BTreeMap<usize, f64> = singles.map(|c| (c.effects[0], c.log_evidence)).collect();
         let mut all = vec![k.prior_null.ln(), k.prior_open.ln() + self.open_nats() / k.doubt_temper];
         all.extend(self.candidates.iter().map(|c| weight(c.effects.len(), c.log_evidence)));
         all.extend(self.unweighed.iter().map(|[a, b]| weight(2, alone[a].max(alone[b]))));

@@ -19,9 +19,7 @@ impl Covariance {
         let inverse_sd = DVector::from_iterator(variance.len(), variance.iter().map(|v| 1.0 / v.sqrt()));
         let whitened = rows_times(phi.clone(), &inverse_sd);
         let mut gram = whitened.transpose() * &whitened;
-        for i in 0..gram.nrows() {
-            gram[(i, i)] += 1.0;
-        }
+        (0..gram.nrows()).for_each(|i| gram[(i, i)] += 1.0);
         // Numbers that overflow make no matrix: such a hypothesis is infinitely unlikely.
         let columns = gram.nrows();
         let (inner, finite) = Cholesky::new(gram).map_or_else(
@@ -121,9 +119,7 @@ impl Scaled {
         let a = active.len();
         let mut inner =
             DMatrix::from_fn(a, a, |i, j| gram[(active[i], active[j])] * sizes[active[i]] * sizes[active[j]]);
-        for i in 0..a {
-            inner[(i, i)] += 1.0;
-        }
+        (0..a).for_each(|i| inner[(i, i)] += 1.0);
         let score = DVector::from_fn(a, |i, _| score[active[i]] * sizes[active[i]]);
         let factor = inner.cholesky()?;
         let log_det = 2.0 * factor.l_dirty().diagonal().iter().map(|d| d.ln()).sum::<f64>();
@@ -135,9 +131,7 @@ impl Scaled {
     pub fn weights(&self) -> DVector<f64> {
         let solved = self.factor.solve(&self.score);
         let mut all = DVector::zeros(self.sizes.len());
-        for (w, &j) in solved.iter().zip(&self.active) {
-            all[j] = w * self.sizes[j];
-        }
+        solved.iter().zip(&self.active).for_each(|(w, &j)| all[j] = w * self.sizes[j]);
         all
     }
 

@@ -189,9 +189,7 @@ impl Kernel {
         let mut row = vec![0.0; r];
         for i in 0..r {
             let mut v = correlation(place, &self.pivots[i]);
-            for j in 0..i {
-                v -= row[j] * self.factor[(i, j)];
-            }
+            (0..i).for_each(|j| v -= row[j] * self.factor[(i, j)]);
             row[i] = v / self.factor[(i, i)];
         }
         row

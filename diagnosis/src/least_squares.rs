@@ -140,9 +140,7 @@ pub fn bounded_step(
         }
         let f = free.len();
         let mut h = DMatrix::from_fn(f, f, |i, j| hessian[(free[i], free[j])]);
-        for i in 0..f {
-            h[(i, i)] += damping * h[(i, i)].max(1e-6) + 1e-10;
-        }
+        (0..f).for_each(|i| h[(i, i)] += damping * h[(i, i)].max(1e-6) + 1e-10);
         let g = DVector::from_fn(f, |i, _| -gradient[free[i]]);
         let step = h.cholesky()?.solve(&g);
         let mut next = u.to_vec();

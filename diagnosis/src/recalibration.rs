@@ -23,9 +23,7 @@ impl Recalibration {
         let raw = prediction - &baseline;
         let mut weighted = jacobian.clone();
         for (i, v) in problem.variance.iter().enumerate() {
-            for k in 0..NUISANCES {
-                weighted[(i, k)] /= *v;
-            }
+            (0..NUISANCES).for_each(|k| weighted[(i, k)] /= *v);
         }
         let t = weighted.transpose();
         let hessian = &t * &jacobian + DMatrix::identity(NUISANCES, NUISANCES);

@@ -199,9 +199,7 @@ impl Hunt<'_> {
         let plain = Covariance::new(&part_variance, &DMatrix::zeros(rows.len(), 0));
         let mut hessian = plain.inner(&jacobian, &jacobian);
         let precision = self.problem.prior_precision(others);
-        for (k, p) in precision.iter().enumerate() {
-            hessian[(k, k)] += p.max(1e-9);
-        }
+        precision.iter().enumerate().for_each(|(k, p)| hessian[(k, k)] += p.max(1e-9));
         // What the others cost where they are: nuisances that were driven far from their calibration are no bargain.
         let pull = DVector::from_iterator(fixed.len(), fixed.iter().zip(&precision).map(|(x, p)| p * x));
         let penalty = pull.dot(&DVector::from_column_slice(fixed));
@@ -217,9 +215,7 @@ impl Hunt<'_> {
                 let step = factor.solve(&score);
                 let misfit: f64 = residual.iter().zip(&part_variance).map(|(r, v)| r * r / v).sum();
                 let cost = misfit + penalty - score.dot(&step);
-                for (k, s) in step.iter().enumerate() {
-                    u[k] += s.clamp(-LONGEST_STEP, LONGEST_STEP);
-                }
+                step.iter().enumerate().for_each(|(k, s)| u[k] += s.clamp(-LONGEST_STEP, LONGEST_STEP));
                 (cost, u)
             })
             .collect();
@@ -257,9 +253,7 @@ impl Hunt<'_> {
         fits.retain(|f| f.cost < BEHIND.0 * ahead + BEHIND.1);
         distinct(&mut fits);
         fits.truncate(count + 1);
-        for f in &mut fits {
-            *f = minimise(&part, self.members, &f.u, &part_variance, ROUNDS.1);
-        }
+        fits.iter_mut().for_each(|f| *f = minimise(&part, self.members, &f.u, &part_variance, ROUNDS.1));
         fits.sort_by(|a, b| a.cost.total_cmp(&b.cost));
         let best = fits.first().map_or(0.0, |f| f.cost);
         fits.retain(|f| f.cost < FAR_BEHIND.0 * best + FAR_BEHIND.1);

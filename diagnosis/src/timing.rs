@@ -269,9 +269,8 @@ fn mean_edge(problem: &Problem<'_>, form: Form, fit: &Fit) -> Vec<[f64; 4]> {
             }
         }
     }
-    bins.into_iter()
-        .map(|(bin, [measured, in_time, found, n])| {
-            [(bin as f64 + 0.5) * BIN_S, measured / n, in_time / n, found / n]
-        })
-        .collect()
+    let mean = |(bin, [measured, in_time, found, n]): (i64, [f64; 4])| {
+        [(bin as f64 + 0.5) * BIN_S, measured / n, in_time / n, found / n]
+    };
+    bins.into_iter().map(mean).collect()
 }

@@ -280,14 +280,9 @@ impl FrictionModel for EmpiricalPsi {
     fn predict(&self, condition: &Condition) -> Result<Prediction, OutOfDomain> {
         let friction = self.relative_friction(condition)?;
         // Eq. 20 knows no contact: the spring-slider says how finger and plate meet.
-        let cycle = spring_slider::solve_checked(condition, &self.finger);
-        Ok(Prediction {
-            mu_relative: friction.mu_relative,
-            mu_relative_sd: friction.sd,
-            lateral_force_n: friction.mu_relative * condition.mu0 * condition.normal_force_n,
-            regime: cycle.regime,
-            validity: friction.validity,
-        })
+        let regime = spring_slider::solve_checked(condition, &self.finger).regime;
+        let known = crate::law_table::prediction(condition, [friction.mu_relative, friction.sd]);
+        Ok(Prediction { regime, validity: friction.validity, ..known })
     }
 
     fn relative_friction(&self, condition: &Condition) -> Result<RelativeFriction, OutOfDomain> {

@@ -180,6 +180,26 @@ impl PassNoise {
         }
         variance.sqrt() / bottom
     }
+
+    /// The first value that cannot be meant.
+    ///
+    /// # Errors
+    /// A value that is not finite, negative or too large; both zero.
+    pub fn check(&self) -> Result<(), RigFileError> {
+        let refuse = |key, value, needed: &str| {
+            Err(RigFileError::Value { section: "noise", key, value, needed: needed.to_string() })
+        };
+        if !(0.0..=1.0).contains(&self.pass_relative_sd) {
+            return refuse("pass_relative_sd", self.pass_relative_sd, "a number from 0 to 1");
+        }
+        if !(0.0..=100.0).contains(&self.force_sd_n) {
+            return refuse("force_sd_n", self.force_sd_n, "a number of newtons from 0 to 100");
+        }
+        if self.pass_relative_sd + self.force_sd_n == 0.0 {
+            return refuse("force_sd_n", 0.0, "noise of at least one kind (pass_relative_sd or force_sd_n)");
+        }
+        Ok(())
+    }
 }
 
 impl Default for PassNoise {
@@ -296,28 +316,6 @@ impl RigFile {
     pub fn json_schema() -> String {
         let schema = schemars::schema_for!(RigFile);
         format!("{}\n", serde_json::to_string_pretty(&schema).expect("a schema is plain JSON"))
-    }
-}
-
-impl PassNoise {
-    /// The first value that cannot be meant.
-    ///
-    /// # Errors
-    /// A value that is not finite, negative or too large; both zero.
-    pub fn check(&self) -> Result<(), RigFileError> {
-        let refuse = |key, value, needed: &str| {
-            Err(RigFileError::Value { section: "noise", key, value, needed: needed.to_string() })
-        };
-        if !(0.0..=1.0).contains(&self.pass_relative_sd) {
-            return refuse("pass_relative_sd", self.pass_relative_sd, "a number from 0 to 1");
-        }
-        if !(0.0..=100.0).contains(&self.force_sd_n) {
-            return refuse("force_sd_n", self.force_sd_n, "a number of newtons from 0 to 100");
-        }
-        if self.pass_relative_sd + self.force_sd_n == 0.0 {
-            return refuse("force_sd_n", 0.0, "noise of at least one kind (pass_relative_sd or force_sd_n)");
-        }
-        Ok(())
     }
 }
 

@@ -179,13 +179,8 @@ impl Tolerances {
 
     /// Says which value makes no sense.
     pub(crate) fn check(&self, wrong: &mut Problems<'_>) {
-        let [p, t, h] = self.of_air();
-        for (key, value) in [
-            ("ambient_pressure_pa", p),
-            ("temperature_c", t),
-            ("relative_humidity_pct", h),
-            ("reached_within_s", self.reached_within_s),
-        ] {
+        let air = AIR.map(|(covariate, _)| covariate.name).into_iter().zip(self.of_air());
+        for (key, value) in air.chain([("reached_within_s", self.reached_within_s)]) {
             if !(value.is_finite() && value > 0.0) {
                 let problem = format!("{key} = {value}: a finite number above zero is needed");
                 wrong.add(&["tolerances", key], problem, None);

@@ -228,9 +228,7 @@ impl Issued {
     /// The document of `--json` without its key `certificate` (the file).
     pub fn document(&self) -> serde_json::Value {
         let mut document = document(&self.certificate);
-        for (key, value) in &self.more {
-            document[*key] = value.clone();
-        }
+        self.more.iter().for_each(|(key, value)| document[*key] = value.clone());
         document
     }
 }
@@ -239,8 +237,7 @@ impl Issued {
 /// an error says what is wrong.
 pub fn check(name: &str, text: &str) -> miette::Result<CertificateKind> {
     let certificate = Certificate::from_toml(text).map_err(|e| miette::miette!("{name}: {e}"))?;
-    let own_serial = certificate.instrument.serial.clone();
-    verify(name, &certificate, certificate.kind, &own_serial)?;
+    verify(name, &certificate, certificate.kind, &certificate.instrument.serial)?;
     Ok(certificate.kind)
 }
 

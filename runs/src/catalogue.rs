@@ -166,10 +166,7 @@ pub fn runs_in(folder: &Path) -> miette::Result<Vec<RunEntry>> {
     let entries = std::fs::read_dir(folder).into_diagnostic();
     let entries = entries.wrap_err_with(|| folder.display().to_string())?;
     let mut runs: Vec<RunEntry> = entries.flatten().filter_map(|entry| RunEntry::of(&entry.path())).collect();
-    let newest_first = |a: &RunEntry, b: &RunEntry| {
-        b.started_unix_s.total_cmp(&a.started_unix_s).then(b.folder.cmp(&a.folder))
-    };
-    runs.sort_by(newest_first);
+    runs.sort_by(|a, b| b.started_unix_s.total_cmp(&a.started_unix_s).then(b.folder.cmp(&a.folder)));
     Ok(runs)
 }
 

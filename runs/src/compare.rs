@@ -292,10 +292,6 @@ impl Side {
     }
 }
 
-fn settings(p: &Pass) -> [f64; 4] {
-    [p.amplitude.metres(), p.frequency_hz, p.speed_m_s, p.normal_force_n]
-}
-
 /// Quantities of the air that the plan of any of these runs sets: their levels are part of a condition.
 fn set_by(sides: &[&Side]) -> OfAir<bool> {
     std::array::from_fn(|at| sides.iter().any(|side| side.sets[at]))
@@ -312,6 +308,7 @@ fn air_of(p: &Pass, set: &OfAir<bool>) -> Ambient {
 }
 
 fn same(a: &Pass, b: &Pass, set: &OfAir<bool>) -> bool {
+    let settings = |p: &Pass| [p.amplitude.metres(), p.frequency_hz, p.speed_m_s, p.normal_force_n];
     let near = |((x, y), within): ((f64, f64), f64)| (x - y).abs() <= within * x.abs().max(y.abs());
     a.direction == b.direction
         && settings(a).into_iter().zip(settings(b)).zip(SAME).all(near)

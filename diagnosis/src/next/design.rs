@@ -87,9 +87,7 @@ pub fn rival(hypotheses: &[Predictive]) -> Option<usize> {
 pub fn expected_nats(a: &Predictive, b: &Predictive, chosen: &[usize]) -> f64 {
     let joint = |h: &Predictive| {
         let mut m = DMatrix::from_fn(chosen.len(), chosen.len(), |i, j| h.covariance[(chosen[i], chosen[j])]);
-        for (i, &c) in chosen.iter().enumerate() {
-            m[(i, i)] += h.scatter[c];
-        }
+        chosen.iter().enumerate().for_each(|(i, &c)| m[(i, i)] += h.scatter[c]);
         m
     };
     let (ca, cb) = (joint(a), joint(b));

@@ -59,9 +59,7 @@ pub fn predictives(
 
     let level: Vec<f64> = list[0].mean.iter().copied().collect();
     let scatter = fitted.scatter_of_a_pass(&problem, rig, &fitted.none.u, &level);
-    for belief in &mut list {
-        belief.scatter.clone_from(&scatter);
-    }
+    list.iter_mut().for_each(|belief| belief.scatter.clone_from(&scatter));
     let (mean, covariance, white) = fitted.discrepancy.belief(&fitted.problem, grid);
     let scatter = scatter.iter().zip(&white).map(|(s, w)| s + w).collect();
     let (name, probability) = ("unknown".to_string(), decision.unknown.max(k.design_least_probability));
@@ -91,9 +89,7 @@ fn expected(fitted: &Fitted, grid: &Problem, basis: &Basis, e: &Posterior) -> (D
         // A uniform prior is as wide as its bounds; a little keeps what the table does not touch finite.
         precision[(k, k)] += p.max(1e-2);
     }
-    for k in d..d + r {
-        precision[(k, k)] += 1.0;
-    }
+    (d..d + r).for_each(|k| precision[(k, k)] += 1.0);
     let factor = precision.cholesky().expect("a prior makes the precision positive definite");
     let root = factor.l().solve_lower_triangular(&planned.transpose());
     let root = root.expect("a Cholesky factor has no zero on its diagonal");

@@ -23,7 +23,7 @@ use models::root::{bisection, newton_or_half};
 use std::f64::consts::PI;
 
 /// What one pass presents to the contact after every effect has had its say. SI units.
-#[derive(Debug, Clone, Copy, PartialEq)]
+#[derive(Debug, Clone, Copy, PartialEq, Default)]
 pub struct Contact {
     /// Intrinsic friction coefficient.
     pub mu0: f64,
@@ -93,9 +93,10 @@ pub struct Contact {
 }
 
 /// Attraction between skin and plate that friction feels beside the normal force.
-#[derive(Debug, Clone, Copy, PartialEq)]
+#[derive(Debug, Clone, Copy, PartialEq, Default)]
 pub enum Attraction {
     /// There is none.
+    #[default]
     None,
     /// `force F / (F + scale)`: it is there as far as the surfaces are pressed into each other.
     Developing {

@@ -1,7 +1,6 @@
 //! The baseline's parameters, what the whole design says about scales, and what a reading is.
 
-use crate::contact::distorted::Harmonic;
-use crate::contact::{Bonds, Contact, Held};
+use crate::contact::{Contact, Held};
 use models::condition::Condition;
 
 /// Reference scales of a whole table: effects that need a zero of time, load or temperature take it from here.
@@ -72,27 +71,11 @@ impl Baseline {
             normal_force: pass.normal_force_n,
             solid_share: 1.0,
             friction_factor: 1.0,
-            adhesion: 0.0,
-            load_exponent: 0.0,
             reference_load: design.reference_load_n,
-            attraction: crate::contact::Attraction::None,
-            inverse_recovery_speed: 0.0,
-            recovery_knee: 0.0,
-            lateral_relaxation_time: 0.0,
-            relaxation_growth: 0.0,
             held: Held::NOTHING,
-            viscous_slip: false,
-            bonds: Bonds::AtOnce,
-            asperity_height: 0.0,
-            asperity_heights: crate::contact::asperities::Heights::Gaussian,
-            normal_retardation_time: 0.0,
-            indentation_damping: 0.0,
-            harmonic: Harmonic { ratio: 0.0, phase: 0.0 },
-            mass: 0.0,
-            massless_share: 0.0,
             ridge_damping_ratio: 1.0,
-            landing: 0,
-            coarse: false,
+            // What effects alone bring in is absent.
+            ..Contact::default()
         }
     }
 

@@ -132,10 +132,6 @@ impl Row<'_> {
         Some(cell.trim()).filter(|text| !text.is_empty())
     }
 
-    fn required(&self, column: &'static str) -> Result<&str, TableError> {
-        self.cell(column).ok_or(TableError::EmptyCell { line: self.line, column })
-    }
-
     fn parsed(
         &self,
         text: &str,
@@ -143,10 +139,8 @@ impl Row<'_> {
         ok: impl Fn(f64) -> bool,
         needed: &'static str,
     ) -> Result<f64, TableError> {
-        match text.parse::<f64>() {
-            Ok(v) if v.is_finite() && ok(v) => Ok(v),
-            _ => Err(self.bad(column, text, needed)),
-        }
+        let value = text.parse::<f64>().ok().filter(|v| v.is_finite() && ok(*v));
+        value.ok_or_else(|| self.bad(column, text, needed))
     }
 
     fn covariate(&self, c: &'static Covariate, text: &str) -> Result<f64, TableError> {
@@ -184,7 +178,8 @@ impl Row<'_> {
     fn pass(&self, found: &mut Readable) -> Option<Pass> {
         let faults = found.count();
         let whole = |text: &str| text.parse().map_err(|_| self.bad("point", text, "a whole number"));
-        let point = found.value(self.required("point").and_then(whole));
+        let empty = TableError::EmptyCell { line: self.line, column: "point" };
+        let point = found.value(self.cell("point").ok_or(empty).and_then(whole));
         let mut condition = Condition::paper();
         for c in covariate::REQUIRED {
             match self.cell(c.name) {
@@ -232,9 +227,7 @@ pub fn read_passes(from: impl Read) -> Result<Vec<Pass>, TableError> {
 /// The same of a table that may have faults: all of them are in what it returns.
 pub fn read_readable(from: impl Read) -> Readable {
     let mut found = Readable::default();
-    if let Err(fault) = read_into(from, &mut found) {
-        found.fault(fault);
-    }
+    read_into(from, &mut found).unwrap_or_else(|fault| found.fault(fault));
     found
 }
 
@@ -285,9 +278,7 @@ pub fn write_passes(passes: &[Pass], to: impl Write) -> Result<(), TableError> {
     let required = std::iter::once("point").chain(covariate::REQUIRED.iter().map(|c| c.name));
     let optional = covariate::OPTIONAL.iter().map(|c| c.name);
     writer.write_record(required.chain(before).chain(optional).chain(after))?;
-    for pass in passes {
-        writer.write_record(cells(pass))?;
-    }
+    passes.iter().try_for_each(|pass| writer.write_record(cells(pass)))?;
     writer.flush().map_err(csv::Error::from)?;
     Ok(())
 }

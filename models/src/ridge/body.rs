@@ -89,9 +89,8 @@ impl ForceRows {
 
     #[inline(always)]
     pub(super) fn clear_owed(&mut self) {
-        for row in [&mut self.owed3_x, &mut self.owed3_y, &mut self.owed4_x, &mut self.owed4_y] {
-            row.fill(0.0);
-        }
+        let owed = [&mut self.owed3_x, &mut self.owed3_y, &mut self.owed4_x, &mut self.owed4_y];
+        owed.into_iter().for_each(|row| row.fill(0.0));
     }
 }
 
@@ -283,9 +282,7 @@ impl Body {
 
     /// Holds the whole top row.
     pub fn hold_top(&mut self) {
-        for i in 0..=self.nx {
-            self.hold(self.node(i, self.ny));
-        }
+        (0..=self.nx).for_each(|i| self.hold(self.node(i, self.ny)));
     }
 
     /// Mass of a node in kg per metre of depth, zero if held.

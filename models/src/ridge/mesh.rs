@@ -75,9 +75,7 @@ impl Mesh {
         };
         for j in 0..=ny {
             for i in 0..=nx {
-                let (x, y) = place(i, j);
-                mesh.x_m[j * stride + i] = x;
-                mesh.y_m[j * stride + i] = y;
+                (mesh.x_m[j * stride + i], mesh.y_m[j * stride + i]) = place(i, j);
             }
         }
         mesh.check()?;
@@ -237,21 +235,20 @@ impl RidgeGeometry {
         let mut row_material = vec![corneum; corneum_rows];
         row_material.extend(std::iter::repeat_n(dermis, dermis_rows));
         row_material.extend(std::iter::repeat_n(subcutaneous, soft_rows));
-        let geometry = *self;
         let mesh = Mesh::from_nodes(nx, row_material, true, |i, j| {
             let side = half_columns[i.abs_diff(nx / 2)];
             let x = if i < nx / 2 { -side } else { side };
             let y = if j <= corneum_rows {
                 // Fine rows at the tip, equal ones at the valley, where the layer is thinner.
-                let side = (2.0 * x / geometry.ridge_width_m).abs();
+                let side = (2.0 * x / self.ridge_width_m).abs();
                 let fine = corneum_levels[j] / corneum_m;
                 let equal = j as f64 / corneum_rows as f64;
-                let surface = geometry.surface_m(x);
+                let surface = self.surface_m(x);
                 surface + (corneum_m - surface) * (fine + (equal - fine) * side)
             } else if j <= corneum_rows + dermis_rows {
                 corneum_m + dermis_levels[j - corneum_rows]
             } else {
-                corneum_m + geometry.dermis_m + soft_levels[j - corneum_rows - dermis_rows]
+                corneum_m + self.dermis_m + soft_levels[j - corneum_rows - dermis_rows]
             };
             (x, y)
         })?;

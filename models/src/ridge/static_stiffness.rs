@@ -111,10 +111,7 @@ pub fn of_mesh(
     let peak_pressure_pa = touching.iter().zip(&forces).map(|(i, f)| f / share(*i)).fold(0.0, f64::max);
     // Both axes at each touching node, stuck to the plate through its springs.
     let stuck: Vec<usize> = touching.iter().flat_map(|i| [2 * i, 2 * i + 1]).collect();
-    let spring = |place: usize| match place % 2 {
-        0 => springs.along[place / 2],
-        _ => springs.across[place / 2],
-    };
+    let spring = |place: usize| [&springs.along, &springs.across][place % 2][place / 2];
     let system = dense(&compliance, &stuck, spring)?;
     let moved = |axis: usize| -> f64 {
         let mut right: Vec<f64> = stuck.iter().map(|p| f64::from(u8::from(p % 2 == axis))).collect();

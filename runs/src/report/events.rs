@@ -148,9 +148,8 @@ pub(super) fn section(events: &[(f64, serde_json::Value)]) -> String {
 fn flat(value: &serde_json::Value) -> String {
     match value {
         serde_json::Value::Object(map) => {
-            let pairs: Vec<String> =
-                map.iter().map(|(k, v)| format!("{} {}", k.replace('_', " "), flat(v))).collect();
-            pairs.join(", ")
+            let pairs = map.iter().map(|(k, v)| format!("{} {}", k.replace('_', " "), flat(v)));
+            pairs.collect::<Vec<_>>().join(", ")
         }
         serde_json::Value::Array(all) => all.iter().map(flat).collect::<Vec<_>>().join(", "),
         serde_json::Value::Number(n) => n.as_f64().map_or_else(|| n.to_string(), number),

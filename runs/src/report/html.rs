@@ -24,9 +24,8 @@ pub fn escape(text: &str) -> String {
 pub fn shell(title: &str, body: &str) -> String {
     format!(
         "<!doctype html><html lang=\"en\"><head><meta charset=\"utf-8\"><title>muprime: {title}</title>\
-         <meta name=\"viewport\" content=\"width=device-width, initial-scale=1\"><style>{}</style></head><body><main>\n\
-         {body}</main></body></html>\n",
-        STYLE
+         <meta name=\"viewport\" content=\"width=device-width, initial-scale=1\"><style>{STYLE}</style></head>\
+         <body><main>\n{body}</main></body></html>\n"
     )
 }
 
@@ -46,11 +45,9 @@ pub fn note(text: &str) -> String {
 
 /// What stands at the top of a page: pairs of a name and a value, both plain text.
 pub fn head(pairs: &[(&str, String)]) -> String {
-    let items: String = pairs
-        .iter()
-        .map(|(name, value)| format!("<dt>{}</dt><dd>{}</dd>", escape(name), escape(value)))
-        .collect();
-    format!("<dl class=\"head\">{items}</dl>\n")
+    let item =
+        |(name, value): &(&str, String)| format!("<dt>{}</dt><dd>{}</dd>", escape(name), escape(value));
+    format!("<dl class=\"head\">{}</dl>\n", pairs.iter().map(item).collect::<String>())
 }
 
 /// A list of plain texts, or the text for none.

@@ -205,11 +205,8 @@ fn figure(
         for default in [" opacity=\"1\"", " stroke=\"none\"", " stroke-width=\"1\""] {
             svg = svg.replace(default, "");
         }
-        let svg = marks_joined(&svg).replacen(
-            "<svg ",
-            &format!("<svg role=\"img\" aria-label=\"{}\" ", escape(alt)),
-            1,
-        );
+        let labelled = format!("<svg role=\"img\" aria-label=\"{}\" ", escape(alt));
+        let svg = marks_joined(&svg).replacen("<svg ", &labelled, 1);
         text.push_str(&format!("<div class=\"{class}\">{svg}</div>"));
     }
     Ok(text)

@@ -8,9 +8,10 @@ use crate::contact::{Contact, arc_load_of, stick};
 use std::f64::consts::PI;
 
 /// Distribution of the heights.
-#[derive(Debug, Clone, Copy, PartialEq)]
+#[derive(Debug, Clone, Copy, PartialEq, Default)]
 pub enum Heights {
     /// Gaussian.
+    #[default]
     Gaussian,
     /// Few tall ones: exponential above the lowest.
     Exponential,

@@ -1,9 +1,10 @@
 //! Bonds that form while skin and plate touch, and so raise the friction limit in the course of a contact.
 
 /// How bonds grow after touch-down.
-#[derive(Debug, Clone, Copy, PartialEq)]
+#[derive(Debug, Clone, Copy, PartialEq, Default)]
 pub enum Bonds {
     /// All are there at once: the baseline.
+    #[default]
     AtOnce,
     /// A share of the limit waits, and `1 - share exp(-(t/time)^exponent)` of it is there after `t`.
     Stretched {

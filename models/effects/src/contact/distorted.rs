@@ -22,7 +22,7 @@ static CYCLE: LazyLock<[(f64, f64); STEPS]> = LazyLock::new(|| {
 });
 
 /// Second harmonic of the plate's motion.
-#[derive(Debug, Clone, Copy, PartialEq)]
+#[derive(Debug, Clone, Copy, PartialEq, Default)]
 pub struct Harmonic {
     /// Its amplitude over that of the first harmonic. 0 in the baseline.
     pub ratio: f64,

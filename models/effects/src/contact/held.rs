@@ -10,7 +10,7 @@ use std::f64::consts::PI;
 const SETTLED: f64 = 1e-7;
 
 /// What is held, and for how long.
-#[derive(Debug, Clone, Copy, PartialEq)]
+#[derive(Debug, Clone, Copy, PartialEq, Default)]
 pub struct Held {
     /// Share of a contact's stretch that is held at lift-off. 0 in the baseline.
     pub share: f64,
