@@ -11,7 +11,8 @@ pub(super) static EFFECT: Effect = Effect {
     source: "cables, bellows and seals in parallel with the force sensor: some mN to tens of mN; the viscous part of a guide's grease",
     laws: &[
         Law::new("constant", &[DRAG]),
-        Law::new("by the speed", &[Parameter::positive("coefficient", "N s/m", 0.15, 10.0)]).needs(&[Need::Speeds]),
+        Law::new("by the speed", &[Parameter::positive("coefficient", "N s/m", 0.15, 10.0)])
+            .needs(&[Need::Speeds]),
     ],
     words: Some("a drag beside the contact"),
     read: |law, theta, pass, _, reading| {
