@@ -247,11 +247,8 @@ fn refused(report: &miette::Report, json: bool) -> ExitCode {
     if json {
         let causes: Vec<String> = report.chain().skip(1).map(|c| cli::plain(&c.to_string())).collect();
         // Of several problems each has a help of its own.
-        let mut helps: Vec<String> = tables::check::problems_of(report)
-            .into_iter()
-            .filter_map(|p| p.help)
-            .filter(|help| !help.is_empty())
-            .collect();
+        let helps = tables::check::problems_of(report).into_iter().filter_map(|p| p.help);
+        let mut helps: Vec<String> = helps.filter(|help| !help.is_empty()).collect();
         helps.dedup();
         let help = (!helps.is_empty()).then(|| helps.join("; "));
         answer_json(&json!({

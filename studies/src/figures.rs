@@ -69,10 +69,8 @@ impl Study {
     pub fn whole(&self, out: &Path) -> miette::Result<Vec<(StudyPoint, store::StoredRun)>> {
         let (results, failed) = self.results(out)?;
         let points = self.points();
-        let found: Vec<_> = points
-            .iter()
-            .filter_map(|p| results.get(&content_key(&p.case, &settings())).map(|k| (*p, k.clone())))
-            .collect();
+        let stored = |p: &StudyPoint| Some((*p, results.get(&content_key(&p.case, &settings()))?.clone()));
+        let found: Vec<_> = points.iter().filter_map(stored).collect();
         if failed > 0 || found.len() < points.len() {
             let missing = points.len() - found.len();
             return Err(miette!("{missing} of {} points of Fig. 9 are missing", points.len()));

@@ -238,14 +238,8 @@ pub fn run(args: Args, json: bool) -> miette::Result<ExitCode> {
     match args.what {
         What::Ridge(a) => {
             let steady = Steady { tolerance: a.tolerance, at_most: a.at_most, ..Steady::default() };
-            let settings = ridge::Settings {
-                elements: a.elements,
-                steady,
-                base: values(&a.set)?,
-                spans: spans(&a.span)?,
-                first: a.first,
-                case: None,
-            };
+            let (elements, base, spans) = (a.elements, values(&a.set)?, spans(&a.span)?);
+            let settings = ridge::Settings { elements, steady, base, spans, first: a.first, case: None };
             let lines = a.from.as_deref().map(rows).transpose()?;
             write("ridge", &a.to, a.draw.unwrap_or(0), &settings, lines.as_deref(), json)
         }
@@ -262,11 +256,8 @@ pub fn run(args: Args, json: bool) -> miette::Result<ExitCode> {
             let (frequency_hz, normal_force_n) = (a.frequency_hz, a.normal_force_n);
             let line = |phases| finger::Line { phases, frequency_hz, normal_force_n };
             let lines = lines(&a.phases, a.list.as_deref(), line)?;
-            let settings = finger::Settings {
-                elements: a.elements,
-                modulus_only: a.modulus_only,
-                ..finger::Settings::default()
-            };
+            let (elements, modulus_only) = (a.elements, a.modulus_only);
+            let settings = finger::Settings { elements, modulus_only, ..finger::Settings::default() };
             write("finger", &a.to, 0, &settings, Some(&lines), json)
         }
         What::Noop(a) => write("noop", &a.to, a.cases, &a.settings, None, json),

@@ -30,8 +30,6 @@ fn pages(command: &Command, name: &str, folder: &Path, written: &mut Vec<PathBuf
     clap_mangen::Man::new(command.clone()).title(name.to_uppercase()).render(&mut page).into_diagnostic()?;
     write_whole(&path, &page)?;
     written.push(path);
-    command
-        .get_subcommands()
-        .filter(|s| !s.is_hide_set())
-        .try_for_each(|sub| pages(sub, &format!("{name}-{}", sub.get_name()), folder, written))
+    let mut shown = command.get_subcommands().filter(|s| !s.is_hide_set());
+    shown.try_for_each(|sub| pages(sub, &format!("{name}-{}", sub.get_name()), folder, written))
 }

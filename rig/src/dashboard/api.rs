@@ -270,7 +270,7 @@ struct ControlRequest {
 async fn ask(State(shared): Server, Path(name): Path<String>, Json(request): Json<ControlRequest>) -> Done {
     let ControlRequest { ask } = request;
     shared.guard.count().map_err(IntoResponse::into_response)?;
-    if !shared.passes_on(ask) {
+    if ask != Ask::Stop && !shared.options.control {
         let why = "this dashboard was started without --allow-control: it stops runs, and nothing else";
         return Err((StatusCode::FORBIDDEN, why).into_response());
     }

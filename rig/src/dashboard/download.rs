@@ -45,16 +45,14 @@ pub fn file(run: &Path, name: &str) -> Option<Response> {
     }
     let mut file = runs::files::open_plain(&run.join(name), OpenOptions::new().read(true)).ok()?;
     let (to, pieces) = channel(WAITING);
-    std::thread::Builder::new()
-        .name("download".into())
-        .spawn(move || {
-            while let Some(piece) = next(&mut file).transpose() {
-                if to.blocking_send(piece).is_err() {
-                    return;
-                }
+    let send = move || {
+        while let Some(piece) = next(&mut file).transpose() {
+            if to.blocking_send(piece).is_err() {
+                return;
             }
-        })
-        .ok()?;
+        }
+    };
+    std::thread::Builder::new().name("download".into()).spawn(send).ok()?;
     Some(([(header::CONTENT_TYPE, "application/octet-stream")], Body::new(Pieces(pieces))).into_response())
 }
 

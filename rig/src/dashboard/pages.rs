@@ -76,10 +76,8 @@ pub fn live(folder: &Path) -> Vec<String> {
 
 fn pages_in(run: &Path) -> Vec<String> {
     let names = std::fs::read_dir(run).into_iter().flatten().flatten();
-    let mut pages: Vec<String> = names
-        .filter_map(|entry| entry.file_name().into_string().ok())
-        .filter(|name| name.ends_with(".html"))
-        .collect();
+    let names = names.filter_map(|entry| entry.file_name().into_string().ok());
+    let mut pages: Vec<String> = names.filter(|name| name.ends_with(".html")).collect();
     pages.sort();
     pages
 }

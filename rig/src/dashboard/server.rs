@@ -3,7 +3,6 @@
 use super::guard::Guard;
 use super::metrics::Followed;
 use super::{Options, api, serve};
-use crate::live::Ask;
 use miette::{IntoDiagnostic, WrapErr};
 use runs::files::open_plain;
 use std::collections::BTreeMap;
@@ -42,11 +41,6 @@ pub(super) struct Diagnoses {
 }
 
 impl Shared {
-    /// Whether this server passes that on.
-    pub fn passes_on(&self, ask: Ask) -> bool {
-        ask == Ask::Stop || self.options.control
-    }
-
     /// Folder of a run by its name; `None` for anything that is not the name of a folder there.
     pub fn folder(&self, name: &str) -> Option<PathBuf> {
         let plain = !name.is_empty() && name != "." && name != ".." && !name.contains(['/', '\\', '\0']);
@@ -88,10 +82,8 @@ impl Dashboard {
             diagnoses: Mutex::default(),
         });
         let runtime = tokio::runtime::Builder::new_current_thread().enable_all().build().into_diagnostic()?;
-        std::thread::Builder::new()
-            .name("dashboard".into())
-            .spawn(move || runtime.block_on(serve::serve(listener, api::routes(shared))))
-            .into_diagnostic()?;
+        let serves = move || runtime.block_on(serve::serve(listener, api::routes(shared)));
+        std::thread::Builder::new().name("dashboard".into()).spawn(serves).into_diagnostic()?;
         Ok(Dashboard { address, token })
     }
 

@@ -68,11 +68,10 @@ impl Feed {
             }
             Update::Off(off) if off.read_back => return,
             Update::Off(off) => Message::Off(off.words()),
-            Update::Progress(made, _, remaining_s) => Message::Progress(Progress {
-                made: self.run.made_before + made,
-                planned: self.run.planned,
-                remaining_s: *remaining_s,
-            }),
+            Update::Progress(made, _, remaining_s) => {
+                let (made, planned) = (self.run.made_before + made, self.run.planned);
+                Message::Progress(Progress { made, planned, remaining_s: *remaining_s })
+            }
         };
         self.tell(message);
     }

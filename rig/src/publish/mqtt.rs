@@ -56,17 +56,15 @@ impl Publisher {
         let shared = Arc::<Shared>::default();
         let (end, ended) = channel();
         let (seen, place) = (Arc::clone(&shared), format!("{}:{}", broker.host, broker.port));
-        std::thread::Builder::new()
-            .name("mqtt".into())
-            .spawn(move || {
-                for event in connection.iter() {
-                    if !follow(&event, &seen, &place) {
-                        break;
-                    }
+        let connect = move || {
+            for event in connection.iter() {
+                if !follow(&event, &seen, &place) {
+                    break;
                 }
-                let _ = end.send(());
-            })
-            .into_diagnostic()?;
+            }
+            let _ = end.send(());
+        };
+        std::thread::Builder::new().name("mqtt".into()).spawn(connect).into_diagnostic()?;
         Ok(Publisher { client, prefix: broker.prefix.clone(), given: 0, dropped: 0, shared, ended })
     }
 

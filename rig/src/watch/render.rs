@@ -14,7 +14,7 @@ const EVERY: Duration = Duration::from_millis(150);
 
 /// Paints until the view is over or its terminal is gone.
 pub(super) fn paint(shared: &Shared) {
-    let look = Look::of_environment();
+    let look = Look::of(|name| std::env::var(name).ok());
     // What the terminal shows; nothing has no area.
     let mut shown = Buffer::default();
     while !shared.is_over() {

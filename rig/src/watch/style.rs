@@ -12,22 +12,15 @@ pub struct Look {
 }
 
 impl Look {
-    /// Of the environment: no colour where `NO_COLOR` asks for none or `TERM` has none; signs by the locale.
-    pub fn of_environment() -> Self {
-        Look::of(|name| std::env::var(name).ok())
-    }
-
-    /// The same by a lookup of variables.
+    /// By the environment: no colour where `NO_COLOR` asks for none or `TERM` has none; signs by the locale.
     pub fn of(variable: impl Fn(&str) -> Option<String>) -> Self {
         let given = |name: &str| variable(name).filter(|value| !value.is_empty());
         let plain = given("TERM")
             .is_none_or(|term| ["dumb", "vt100", "vt102", "vt220", "linux-m"].iter().any(|t| term == *t));
         let locale = ["LC_ALL", "LC_CTYPE", "LANG"].into_iter().find_map(given).unwrap_or_default();
         let locale = locale.to_lowercase();
-        Look {
-            colour: given("NO_COLOR").is_none() && !plain,
-            unicode: locale.contains("utf-8") || locale.contains("utf8"),
-        }
+        let colour = given("NO_COLOR").is_none() && !plain;
+        Look { colour, unicode: locale.contains("utf-8") || locale.contains("utf8") }
     }
 
     /// A style that stands out in this colour, bold where there is none.

@@ -84,25 +84,6 @@ impl Claim {
         let more = if self.effect.is_some_and(covered) { ", with a change within the margin" } else { "" };
         format!("{word}{more}")
     }
-
-    fn new(
-        [name, statement, source]: [&'static str; 3],
-        expected: Trend,
-        margin: f64,
-        found: Result<(Effect, String), String>,
-    ) -> Self {
-        let (effect, of) = match found {
-            Ok((effect, of)) => (Some(effect), of),
-            Err(why) => (None, why),
-        };
-        let answer = match effect.and_then(|e| trend(e.ci95, margin)) {
-            None => Answer::Undecided,
-            Some(found) if found == expected => Answer::Supported,
-            Some(_) => Answer::Contradicted,
-        };
-        let visible = effect.map(|e| margin + 0.5 * (e.ci95[1] - e.ci95[0]));
-        Claim { name, statement, source, expected, effect, of, margin, answer, visible }
-    }
 }
 
 const RESULT: &str = "part 1, section 6 (ii)";
@@ -138,7 +119,17 @@ pub fn claims(sessions: &[Measured], margin: f64) -> Vec<Claim> {
     ]
     .into_iter()
     .map(|(name, statement, source, expected, found)| {
-        Claim::new([name, statement, source], expected, margin, found)
+        let (effect, of) = match found {
+            Ok((effect, of)) => (Some(effect), of),
+            Err(why) => (None, why),
+        };
+        let answer = match effect.and_then(|e| trend(e.ci95, margin)) {
+            None => Answer::Undecided,
+            Some(found) if found == expected => Answer::Supported,
+            Some(_) => Answer::Contradicted,
+        };
+        let visible = effect.map(|e| margin + 0.5 * (e.ci95[1] - e.ci95[0]));
+        Claim { name, statement, source, expected, effect, of, margin, answer, visible }
     })
     .collect()
 }

@@ -139,12 +139,8 @@ fn of_cell(made: &[Measured], cell: usize) -> impl Iterator<Item = &Measured> {
 fn figure(file: &CampaignFile, made: &[Measured], factor: &'static Covariate) -> miette::Result<String> {
     let all: Vec<Driven> = made.iter().flat_map(|s| s.driven.iter().copied()).collect();
     let found = groups(factor, &all);
-    let Some((_, levels)) = found.iter().max_by_key(|(_, levels)| levels.len()) else {
-        return Ok(String::new());
-    };
-    if levels.len() < 2 {
-        return Ok(String::new());
-    }
+    let most = found.iter().max_by_key(|(_, levels)| levels.len()).filter(|(_, levels)| levels.len() > 1);
+    let Some((_, levels)) = most else { return Ok(String::new()) };
     let (scale, unit) = factor.shown;
     let values: Vec<f64> =
         levels.values().filter_map(|l| mean(l.iter().filter_map(|d| factor.of(&d.condition)))).collect();

@@ -110,31 +110,26 @@ impl CaseFile {
     /// # Errors
     /// A range beyond the end, or a file that cannot be read.
     pub fn lines(&self, range: Range<u64>) -> miette::Result<Lines> {
-        if range.end > self.header.cases || range.start > range.end {
-            miette::bail!(
-                "cases {}..{} of {}, which has {}",
-                range.start,
-                range.end,
-                self.path.display(),
-                self.header.cases
-            );
+        let (Range { start, end }, cases) = (range, self.header.cases);
+        if end > cases || start > end {
+            miette::bail!("cases {start}..{end} of {}, which has {cases}", self.path.display());
         }
         let mut lines = None;
         if self.header.listed {
             let mut file = File::open(&self.path).into_diagnostic()?;
-            let skipped = self.header.line_bytes.map_or(0, |bytes| bytes * range.start);
+            let skipped = self.header.line_bytes.map_or(0, |bytes| bytes * start);
             file.seek(SeekFrom::Start(self.header_bytes + skipped)).into_diagnostic()?;
             let mut reader = BufReader::new(file);
             if self.header.line_bytes.is_none() {
                 let mut dropped = Vec::new();
-                for _ in 0..range.start {
+                for _ in 0..start {
                     dropped.clear();
                     reader.by_ref().take(LONGEST_LINE).read_until(b'\n', &mut dropped).into_diagnostic()?;
                 }
             }
             lines = Some(reader);
         }
-        Ok(Lines { path: self.path.clone(), next: range.start, end: range.end, lines })
+        Ok(Lines { path: self.path.clone(), next: start, end, lines })
     }
 }
 
@@ -159,11 +154,8 @@ impl Iterator for Lines {
         let mut line = Vec::new();
         let read = reader.by_ref().take(LONGEST_LINE).read_until(b'\n', &mut line).into_diagnostic();
         let parsed = read.and_then(|_| serde_json::from_slice(&line).into_diagnostic());
-        Some(
-            parsed
-                .map(|value| (index, Some(value)))
-                .wrap_err_with(|| format!("{} line {}", self.path.display(), index + 2)),
-        )
+        let found = parsed.map(|value| (index, Some(value)));
+        Some(found.wrap_err_with(|| format!("{} line {}", self.path.display(), index + 2)))
     }
 }
 

@@ -190,13 +190,9 @@ fn opened(study: &Study, range: &Range<u64>, path: &Path) -> miette::Result<Read
     fits("version", &study.kind.version())?;
     fits("header", &study.file.digest)?;
     fits("range", &format!("{}..{}", range.start, range.end))?;
-    if reader.rows != range.end - range.start {
-        miette::bail!(
-            "{}: {} rows, where its name says {}",
-            path.display(),
-            reader.rows,
-            range.end - range.start
-        );
+    let (rows, due) = (reader.rows, range.end - range.start);
+    if rows != due {
+        miette::bail!("{}: {rows} rows, where its name says {due}", path.display());
     }
     Ok(reader)
 }

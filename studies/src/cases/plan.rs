@@ -120,12 +120,8 @@ pub fn cut(holes: &[Range<u64>], pilot: &Pilot, workers: u64, task_s: f64, limit
     let cases_a_task = by_time.min(by_share).min(MOST).max(missing.div_ceil(TASKS)).max(1);
     let ranges = holes.iter().flat_map(|hole| pieces(hole, cases_a_task)).collect();
     let expected = cases_a_task as f64 * pilot.mean_s;
-    Plan {
-        ranges,
-        cases_a_task,
-        task_s: expected,
-        limit_s: limit_s.unwrap_or(60.0 + 3.0 * expected + 5.0 * pilot.longest_s),
-    }
+    let limit_s = limit_s.unwrap_or(60.0 + 3.0 * expected + 5.0 * pilot.longest_s);
+    Plan { ranges, cases_a_task, task_s: expected, limit_s }
 }
 
 #[cfg(test)]

@@ -90,10 +90,8 @@ impl Study {
             Err(why) if why.kind() == ErrorKind::NotFound => {
                 let (part, mut file) = study.part("study.json")?;
                 let text = serde_json::to_vec(&manifest).into_diagnostic()?;
-                file.write_all(&text)
-                    .and_then(|()| file.sync_all())
-                    .into_diagnostic()
-                    .wrap_err("study.json")?;
+                let written = file.write_all(&text).and_then(|()| file.sync_all());
+                written.into_diagnostic().wrap_err("study.json")?;
                 crash_points::here("study-written");
                 // Whoever was first with another study is found by the keys of its shards.
                 fs::rename(&part, &place).into_diagnostic().wrap_err_with(|| place.display().to_string())?;

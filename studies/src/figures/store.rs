@@ -74,11 +74,8 @@ pub type Results = HashMap<String, StoredRun>;
 pub fn complete(out: &Path, cases: impl IntoIterator<Item = RidgeCase>) -> miette::Result<(Results, usize)> {
     let settings = super::settings();
     let mut seen = std::collections::HashSet::new();
-    let cases: Vec<(String, RidgeCase)> = cases
-        .into_iter()
-        .map(|case| (content_key(&case, &settings), case))
-        .filter(|(key, _)| seen.insert(key.clone()))
-        .collect();
+    let keyed = cases.into_iter().map(|case| (content_key(&case, &settings), case));
+    let cases: Vec<(String, RidgeCase)> = keyed.filter(|(key, _)| seen.insert(key.clone())).collect();
     let Some((_, first)) = cases.first() else { return Ok((Results::new(), 0)) };
     let about = ridge::Settings { case: Some(*first), steady: settings.steady, ..ridge::Settings::default() };
     let keys: String = cases.iter().map(|(key, _)| key.as_str()).collect();

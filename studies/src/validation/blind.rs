@@ -13,6 +13,7 @@ use diagnosis::data::{RigFile, Table};
 use diagnosis::hypotheses::Options;
 use diagnosis::verdict::diagnose;
 use miette::IntoDiagnostic;
+use models::condition::Condition;
 use models::covariate;
 use reliability::{Entry, identifiable};
 use serde::{Deserialize, Serialize};
@@ -55,12 +56,8 @@ impl Settings {
                 .ok_or_else(|| miette::miette!("--constant {setting}: NAME=VALUE is needed"))?;
             constants.set(name.trim(), value).map_err(|e| miette::miette!("--constant {setting}: {e}"))?;
         }
-        Ok(Options {
-            constants: Arc::new(constants),
-            pairs: !self.no_pairs,
-            without: self.without.clone(),
-            ..Options::default()
-        })
+        let (constants, without) = (Arc::new(constants), self.without.clone());
+        Ok(Options { constants, pairs: !self.no_pairs, without, ..Options::default() })
     }
 }
 
@@ -182,17 +179,16 @@ pub fn score(set: &Set, options: &Options) -> miette::Result<Scored> {
         wanted.push((t - f.recalibrated).abs() > 2.0 * sd);
     }
     let shrink = |left: f64| (recalibrated > 0.0).then(|| 1.0 - (left / recalibrated).sqrt());
-    let named: Vec<bool> = conditions
-        .passes
-        .iter()
-        .map(|p| {
-            let value = |name: &str| covariate::by_name(name).and_then(|c| c.of(p)).unwrap_or(f64::NAN);
-            let holds = |(name, [low, high]): (&&str, &[f64; 2])| (*low..=*high).contains(&value(name));
-            report.location.regions.iter().any(|r| r.bounds.iter().all(holds))
-        })
-        .collect();
+    let is_named = |p: &Condition| {
+        let value = |name: &str| covariate::by_name(name).and_then(|c| c.of(p)).unwrap_or(f64::NAN);
+        let holds = |(name, [low, high]): (&&str, &[f64; 2])| (*low..=*high).contains(&value(name));
+        report.location.regions.iter().any(|r| r.bounds.iter().all(holds))
+    };
+    let named: Vec<bool> = conditions.passes.iter().map(is_named).collect();
     let both = named.iter().zip(&wanted).filter(|(a, b)| **a && **b).count() as f64;
     let sizes = (named.iter().filter(|x| **x).count() + wanted.iter().filter(|x| **x).count()) as f64;
+    let entries = report.hypotheses.iter();
+    let entries = entries.map(|h| Entry { probability: h.probability, right: says_truth(&h.effects) });
     let region_f1 = wanted.iter().any(|x| *x).then(|| 2.0 * both / sizes.max(1.0));
 
     Ok(Scored {
@@ -208,11 +204,7 @@ pub fn score(set: &Set, options: &Options) -> miette::Result<Scored> {
         probability_of_truth,
         top_probability: first.probability,
         top_right: says_truth(&first.effects),
-        entries: report
-            .hypotheses
-            .iter()
-            .map(|h| Entry { probability: h.probability, right: says_truth(&h.effects) })
-            .collect(),
+        entries: entries.collect(),
         distance: distance::distance(set),
         claimed: report.gap.shrinkage,
         claimed_ci95: report.gap.shrinkage_ci95,
@@ -272,13 +264,9 @@ pub fn share(name: &'static str, target: &'static str, outcomes: Vec<bool>) -> F
     let z = 1.96;
     let centre = (p + z * z / (2.0 * m)) / (1.0 + z * z / m);
     let half = z / (1.0 + z * z / m) * (p * (1.0 - p) / m + z * z / (4.0 * m * m)).sqrt();
-    Figure {
-        name,
-        value: (n > 0).then_some(p),
-        ci95: (n > 0).then(|| [(centre - half).max(0.0), (centre + half).min(1.0)]),
-        n,
-        target,
-    }
+    let value = (n > 0).then_some(p);
+    let ci95 = value.map(|_| [(centre - half).max(0.0), (centre + half).min(1.0)]);
+    Figure { name, value, ci95, n, target }
 }
 
 /// A statistic with the interval of a bootstrap.
@@ -292,27 +280,16 @@ pub fn statistic<T: Copy>(
         return Figure { name, value: None, ci95: None, n: 0, target };
     }
     let mut state = 1u64;
-    let mut draws: Vec<f64> = (0..400)
-        .map(|_| {
-            let mut sample: Vec<T> = (0..values.len())
-                .map(|_| {
-                    state =
-                        state.wrapping_mul(6_364_136_223_846_793_005).wrapping_add(1_442_695_040_888_963_407);
-                    values[((state >> 33) as usize) % values.len()]
-                })
-                .collect();
-            of(&mut sample)
-        })
-        .collect();
+    let mut drawn = || {
+        state = state.wrapping_mul(6_364_136_223_846_793_005).wrapping_add(1_442_695_040_888_963_407);
+        values[((state >> 33) as usize) % values.len()]
+    };
+    let mut again = || of(&mut (0..values.len()).map(|_| drawn()).collect::<Vec<T>>());
+    let mut draws: Vec<f64> = (0..400).map(|_| again()).collect();
     draws.sort_by(f64::total_cmp);
-    Figure {
-        name,
-        value: Some(of(&mut values.to_vec())),
-        // One value drawn again and again says nothing of how far others lie from it.
-        ci95: (values.len() > 1).then_some([draws[10], draws[389]]),
-        n: values.len(),
-        target,
-    }
+    // One value drawn again and again says nothing of how far others lie from it.
+    let ci95 = (values.len() > 1).then_some([draws[10], draws[389]]);
+    Figure { name, value: Some(of(&mut values.to_vec())), ci95, n: values.len(), target }
 }
 
 fn mean(v: &mut [f64]) -> f64 {
@@ -340,13 +317,8 @@ pub fn figures(all: &[Scored]) -> Vec<Figure> {
     let none: Vec<&Scored> = all.iter().filter(|s| s.stratum == Stratum::None).collect();
     let outside: Vec<&Scored> =
         all.iter().filter(|s| s.stratum == Stratum::Outside).filter(detectable).collect();
-    let pairs: Vec<&Scored> = all
-        .iter()
-        .filter(|s| {
-            s.stratum == Stratum::Pair && s.best_single_leaves.is_some_and(|share| share >= PAIR_LEAVES)
-        })
-        .filter(detectable)
-        .collect();
+    let leaves = |s: &&Scored| s.best_single_leaves.is_some_and(|share| share >= PAIR_LEAVES);
+    let pairs = all.iter().filter(|s| s.stratum == Stratum::Pair).filter(leaves).filter(detectable);
     let of = |list: &[&Scored], f: &dyn Fn(&Scored) -> bool| list.iter().map(|s| f(s)).collect::<Vec<bool>>();
     // A class joins names in the library's order, the truth stands in that of the alphabet.
     let in_class = |s: &Scored| {
@@ -366,7 +338,7 @@ pub fn figures(all: &[Scored]) -> Vec<Figure> {
     let honest: Vec<f64> = gapped.iter().filter_map(|s| Some((s.claimed? - s.achieved?).abs())).collect();
     let regions: Vec<f64> = all.iter().filter(detectable).filter_map(|s| s.region_f1).collect();
     let faint_regions: Vec<f64> = all.iter().filter(faint).filter_map(|s| s.region_f1).collect();
-    let (pairs, murky_pairs): (Vec<&Scored>, Vec<&Scored>) = pairs.iter().partition(|s| s.decidable);
+    let (pairs, murky_pairs): (Vec<&Scored>, Vec<&Scored>) = pairs.partition(|s| s.decidable);
     let identifiable_sets = all.iter().filter(|s| identifiable(s));
     let coverage: Vec<f64> = all.iter().map(|s| s.covered).collect();
     let promised = |s: &&Scored| Some((s.claimed_ci95?, s.achieved?));

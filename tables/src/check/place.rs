@@ -38,13 +38,8 @@ fn place_of(of: &dyn miette::Diagnostic) -> Option<(usize, usize, Option<String>
 }
 
 fn one(of: &dyn miette::Diagnostic) -> Problem {
-    let place = place_of(of).map(|(line, column, _)| (line, column));
-    Problem {
-        problem: of.to_string(),
-        line: place.map(|(line, _)| line),
-        column: place.map(|(_, column)| column),
-        help: of.help().map(|h| h.to_string()),
-    }
+    let (line, column) = place_of(of).map(|(line, column, _)| (line, column)).unzip();
+    Problem { problem: of.to_string(), line, column, help: of.help().map(|h| h.to_string()) }
 }
 
 /// A refusal whose every problem has a place in the file, where the file has such a key, and a remedy.

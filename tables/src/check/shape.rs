@@ -30,8 +30,7 @@ fn all_wrong(schema: &Value, text: &str) -> Option<Vec<Wrong>> {
 /// Tells of everything in a TOML text that its schema does not admit. Nothing where the text is not TOML:
 /// its reader says that best.
 pub fn toml(schema: &Value, text: &str, problems: &mut Problems<'_>) {
-    let wrong = all_wrong(schema, text).unwrap_or_default();
-    for w in wrong {
+    for w in all_wrong(schema, text).unwrap_or_default() {
         let list = w.problem.ends_with("a list in [ ] is needed").then(|| w.place.clone());
         let as_list = list.and_then(|place| runs::input::as_list(text, place));
         problems.add_at(w.place, w.problem, as_list.or(w.remedy));

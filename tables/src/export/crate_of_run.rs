@@ -152,18 +152,16 @@ fn files_of(folder: &Path) -> miette::Result<Vec<Value>> {
     paths.sort();
     let name = |path: &Path| path.file_name().map(|n| n.to_string_lossy().into_owned()).unwrap_or_default();
     paths.retain(|path| path.is_file() && !name(path).starts_with('.') && name(path) != FILE);
-    paths
-        .iter()
-        .map(|path| {
-            let bytes = std::fs::read(path).into_diagnostic().wrap_err_with(|| path.display().to_string())?;
-            let name = name(path);
-            let (kind, words) = about(&name);
-            Ok(json!({
-                "@id": name, "@type": "File", "name": name, "description": words, "encodingFormat": kind,
-                "contentSize": bytes.len().to_string(), "sha256": sha256_hex(&bytes),
-            }))
-        })
-        .collect()
+    let entity = |path: &PathBuf| {
+        let bytes = std::fs::read(path).into_diagnostic().wrap_err_with(|| path.display().to_string())?;
+        let name = name(path);
+        let (kind, words) = about(&name);
+        Ok(json!({
+            "@id": name, "@type": "File", "name": name, "description": words, "encodingFormat": kind,
+            "contentSize": bytes.len().to_string(), "sha256": sha256_hex(&bytes),
+        }))
+    };
+    paths.iter().map(entity).collect()
 }
 
 /// Media type of a file of a run's folder, and what it is.

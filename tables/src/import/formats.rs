@@ -57,7 +57,32 @@ pub fn read(
     wanted: &[String],
 ) -> miette::Result<Grid> {
     let shown = path.display();
-    let grid = unharmed("", || read_known(path, bytes, sheet, marks, wanted));
+    let ending = path.extension().and_then(|e| e.to_str()).unwrap_or_default().to_lowercase();
+    let workbook = ["xlsx", "xlsm", "xlsb", "xls", "ods"].contains(&ending.as_str());
+    let grid = unharmed("", || {
+        if is_parquet(bytes) {
+            binary::parquet(path)
+        } else if bytes.starts_with(b"ARROW1") {
+            binary::arrow(bytes)
+        } else if bytes.starts_with(b"\x93NUMPY") {
+            binary::npy(bytes)
+        } else if bytes.starts_with(b"MATLAB 5.0 MAT-file") {
+            mat::read(bytes, sheet, wanted)
+        } else if bytes.starts_with(b"\x89HDF\r\n") || bytes.starts_with(b"MATLAB 7.3 MAT-file") {
+            hdf5::read(bytes, sheet, wanted)
+        } else if workbook && bytes.starts_with(b"PK") || bytes.starts_with(b"\xd0\xcf\x11\xe0") {
+            workbook::read(bytes, sheet)
+        } else if bytes.trim_ascii_start().starts_with(b"<") {
+            miette::bail!(
+                help = "open it in a spreadsheet program and save it as .xlsx or CSV",
+                "{shown} is HTML or XML"
+            )
+        } else if bytes.starts_with(b"PK\x03\x04") || bytes.starts_with(b"\x1f\x8b") {
+            miette::bail!(help = "unpack it first; of .npz, save one array as .npy", "{shown} is packed")
+        } else {
+            text::read(bytes, marks)
+        }
+    });
     let grid = grid.wrap_err_with(|| shown.to_string())?;
     if grid.rows.is_empty() {
         let notes = grid.notes.join("\n");
@@ -88,40 +113,6 @@ fn unharmed(of: &str, reads: impl FnOnce() -> miette::Result<Grid>) -> miette::R
     READS.set(false);
     let damaged = |_| miette::miette!(help = "export it again, or as CSV", "{of}the file is damaged");
     read.map_err(damaged)?
-}
-
-fn read_known(
-    path: &Path,
-    bytes: &[u8],
-    sheet: Option<&str>,
-    marks: Marks,
-    wanted: &[String],
-) -> miette::Result<Grid> {
-    let shown = path.display();
-    let ending = path.extension().and_then(|e| e.to_str()).unwrap_or_default().to_lowercase();
-    let workbook = ["xlsx", "xlsm", "xlsb", "xls", "ods"].contains(&ending.as_str());
-    if is_parquet(bytes) {
-        binary::parquet(path)
-    } else if bytes.starts_with(b"ARROW1") {
-        binary::arrow(bytes)
-    } else if bytes.starts_with(b"\x93NUMPY") {
-        binary::npy(bytes)
-    } else if bytes.starts_with(b"MATLAB 5.0 MAT-file") {
-        mat::read(bytes, sheet, wanted)
-    } else if bytes.starts_with(b"\x89HDF\r\n") || bytes.starts_with(b"MATLAB 7.3 MAT-file") {
-        hdf5::read(bytes, sheet, wanted)
-    } else if workbook && bytes.starts_with(b"PK") || bytes.starts_with(b"\xd0\xcf\x11\xe0") {
-        workbook::read(bytes, sheet)
-    } else if bytes.trim_ascii_start().starts_with(b"<") {
-        miette::bail!(
-            help = "open it in a spreadsheet program and save it as .xlsx or CSV",
-            "{shown} is HTML or XML"
-        )
-    } else if bytes.starts_with(b"PK\x03\x04") || bytes.starts_with(b"\x1f\x8b") {
-        miette::bail!(help = "unpack it first; of .npz, save one array as .npy", "{shown} is packed")
-    } else {
-        text::read(bytes, marks)
-    }
 }
 
 #[cfg(test)]

@@ -89,11 +89,9 @@ impl Values {
         }
         for column in &map.columns {
             let Some(cell) = row.cells.get(column.index).filter(|c| **c != Cell::Empty) else { continue };
-            let drop = |reason: &str| Dropped {
-                row: row.place,
-                column: column.header.clone(),
-                text: cell.shown(),
-                reason: reason.into(),
+            let drop = |reason: &str| {
+                let (column, text) = (column.header.clone(), cell.shown());
+                Dropped { row: row.place, column, text, reason: reason.into() }
             };
             let number = || match (cell.ratio(grid.comma), column.target.kind) {
                 (None, _) => cell.digits(grid.comma).and_then(|d| column.unit.apply(&d)),

@@ -100,11 +100,8 @@ pub fn rig(passes: &[Pass], source: &str, tip: Option<&str>) -> miette::Result<(
                 "of a human fingertip; a still plate does not ask for them"
             };
             assumed.push(format!("stiffnesses {from}"));
-            let finger = models::finger::Finger {
-                stiffness_relative_sd: if vibrates { 0.5 } else { 0.05 },
-                young_modulus_pa: None,
-                ..paper
-            };
+            let stiffness_relative_sd = if vibrates { 0.5 } else { 0.05 };
+            let finger = models::finger::Finger { stiffness_relative_sd, young_modulus_pa: None, ..paper };
             (finger, format!("ASSUMED {from}"))
         }
     };

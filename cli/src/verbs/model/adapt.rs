@@ -77,14 +77,8 @@ pub fn run(args: &AdaptArgs, json: bool) -> miette::Result<ExitCode> {
     let (spans, base) = (spans(&args.span)?, values(&args.set)?);
     let steady = Steady { tolerance: args.tolerance, at_most: args.at_most, ..Steady::default() };
     let header = |spans: BTreeMap<String, ridge::Span>, cases: u64| {
-        let settings = ridge::Settings {
-            elements: args.elements,
-            steady,
-            base: base.clone(),
-            spans,
-            first: HELD_OUT_FROM,
-            case: None,
-        };
+        let (elements, base) = (args.elements, base.clone());
+        let settings = ridge::Settings { elements, steady, base, spans, first: HELD_OUT_FROM, case: None };
         Header::of(&ridge::KIND, &settings, cases)
     };
     // Looked at before anything is written.

@@ -48,12 +48,8 @@ pub struct ContactArgs {
 impl ContactArgs {
     /// A case with this contact.
     pub fn of(&self, case: RidgeCase) -> RidgeCase {
-        RidgeCase {
-            penalty_ratio: self.penalty_ratio,
-            tangential_penalty_ratio: self.tangential_penalty_ratio,
-            tangential_stiffness_pa_m: self.tangential_stiffness_pa_m,
-            ..case
-        }
+        let ContactArgs { penalty_ratio, tangential_penalty_ratio, tangential_stiffness_pa_m } = *self;
+        RidgeCase { penalty_ratio, tangential_penalty_ratio, tangential_stiffness_pa_m, ..case }
     }
 }
 

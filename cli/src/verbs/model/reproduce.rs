@@ -81,12 +81,9 @@ pub struct ReproduceArgs {
 impl ReproduceArgs {
     /// The paper's nominal case with what is stated of the open quantities.
     fn base(&self) -> RidgeCase {
-        self.contact.of(RidgeCase {
-            elements: self.elements,
-            mean_pressure_pa: self.mean_pressure_pa,
-            mass_damping_per_s: self.mass_damping_per_s,
-            ..RidgeCase::paper()
-        })
+        let ReproduceArgs { elements, mean_pressure_pa, mass_damping_per_s, .. } = *self;
+        let paper = RidgeCase::paper();
+        self.contact.of(RidgeCase { elements, mean_pressure_pa, mass_damping_per_s, ..paper })
     }
 }
 

@@ -108,11 +108,9 @@ fn answers(command: &str, conditions: &str) -> miette::Result<Vec<[f64; 2]>> {
     };
     let number =
         |row: &csv::StringRecord, k: usize| row.get(k).and_then(|t| t.parse().ok()).unwrap_or(f64::NAN);
-    reader
-        .records()
-        .map(|row| {
-            let row = row.into_diagnostic().wrap_err_with(failed)?;
-            Ok([number(&row, mu), sd.map_or(0.0, |k| number(&row, k))])
-        })
-        .collect()
+    let answer = |row: csv::Result<csv::StringRecord>| {
+        let row = row.into_diagnostic().wrap_err_with(failed)?;
+        Ok([number(&row, mu), sd.map_or(0.0, |k| number(&row, k))])
+    };
+    reader.records().map(answer).collect()
 }

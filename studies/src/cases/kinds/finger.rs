@@ -53,11 +53,8 @@ pub struct Settings {
 
 impl Default for Settings {
     fn default() -> Self {
-        Settings {
-            elements: models::ridge::case::ELEMENTS,
-            modulus_only: false,
-            modulus_range_pa: [10e6, 1e9],
-        }
+        let elements = models::ridge::case::ELEMENTS;
+        Settings { elements, modulus_only: false, modulus_range_pa: [10e6, 1e9] }
     }
 }
 

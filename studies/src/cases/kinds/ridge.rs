@@ -97,14 +97,8 @@ pub struct Settings {
 
 impl Default for Settings {
     fn default() -> Self {
-        Settings {
-            elements: case::ELEMENTS,
-            steady: Steady::default(),
-            base: BTreeMap::new(),
-            spans: BTreeMap::new(),
-            first: 1,
-            case: None,
-        }
+        let (base, spans) = Default::default();
+        Settings { elements: case::ELEMENTS, steady: Steady::default(), base, spans, first: 1, case: None }
     }
 }
 
@@ -136,11 +130,8 @@ pub fn set(mut case: RidgeCase, values: &BTreeMap<String, f64>) -> miette::Resul
 
 /// What a line states of a case: each of [`VARIABLES`].
 pub fn line_of(case: &RidgeCase) -> serde_json::Value {
-    VARIABLES
-        .into_iter()
-        .zip(values(case))
-        .map(|(name, value)| (name.to_string(), serde_json::Value::from(value)))
-        .collect()
+    let entry = |(name, value): (&str, f64)| (name.to_string(), serde_json::Value::from(value));
+    VARIABLES.into_iter().zip(values(case)).map(entry).collect()
 }
 
 /// The values of [`VARIABLES`] in a case.

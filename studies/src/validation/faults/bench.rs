@@ -114,13 +114,8 @@ impl FrictionModel for Diverging {
 fn grating() -> Target {
     let step_m = 1e-4;
     let at = |k: i32| 0.28 + 0.05 * (std::f64::consts::PI * f64::from(k) * step_m / 1e-3).sin();
-    Target {
-        start_m: -0.1,
-        step_m,
-        mu_relative: (-1000..=1000).map(at).collect(),
-        lead_s: 0.0,
-        feedback: None,
-    }
+    let mu_relative = (-1000..=1000).map(at).collect();
+    Target { start_m: -0.1, step_m, mu_relative, lead_s: 0.0, feedback: None }
 }
 
 fn time_of(cycle: u64) -> Nanos {
@@ -459,14 +454,12 @@ impl Watch {
         if let Some(trip) = self.trip.filter(|t| !scene.strikes.is_empty() && !may.contains(&t.cause)) {
             self.wrong.push(format!("tripped for {:?}, which is none of {may:?}", trip.cause));
         }
-        let bounds: Vec<(u64, u64)> = scene
-            .strikes
-            .iter()
-            .filter_map(|s| match ROWS[s.row].expect {
-                Expect::Off(within) => Some((s.at, within.at(&timing))),
-                _ => None,
-            })
-            .collect();
+        let bounds = scene.strikes.iter().filter_map(|s| match ROWS[s.row].expect {
+            Expect::Off(within) => Some((s.at, within.at(&timing))),
+            _ => None,
+        });
+        let slower = bounds.reduce(|a, b| (a.0.max(b.0), a.1.max(b.1)));
+        let in_the_slower = self.off_at.zip(slower).is_some_and(|(off, (at, bound))| off < at + bound);
         for (i, strike) in scene.strikes.iter().enumerate() {
             let row = &ROWS[strike.row];
             let shown = match row.what {
@@ -490,7 +483,7 @@ impl Watch {
                         scene.moment == Moment::Render && row.causes.contains(&Cause::AmplitudeRunaway);
                     let meanwhile = if changes { timing.response().0 / T.0 } else { 0 };
                     let bound = within.at(&timing) + meanwhile;
-                    let masked = interact(scene) && off_within_the_slower(self.off_at, &bounds);
+                    let masked = interact(scene) && in_the_slower;
                     if !off_in_time(bound) && !masked {
                         late("not off in time", bound);
                     }
@@ -527,15 +520,8 @@ impl Watch {
         if self.alone_amplitude > 0.0 && self.alone_quiet_at.is_none_or(|n| n > WATCHDOG + ring_cycles()) {
             self.wrong.push(format!("the amplifier's own watchdog: {:?} ms", self.alone_quiet_at));
         }
-        Found {
-            cycles: scene.length(),
-            trip: self.trip,
-            shown: shown_cycles,
-            command_off,
-            measured_off,
-            wrong: self.wrong,
-            hash: None,
-        }
+        let (cycles, trip, wrong) = (scene.length(), self.trip, self.wrong);
+        Found { cycles, trip, shown: shown_cycles, command_off, measured_off, wrong, hash: None }
     }
 }
 
@@ -554,12 +540,6 @@ fn interact(scene: &Scene) -> bool {
         )
     };
     scene.strikes.len() > 1 && scene.strikes.iter().all(amplifier)
-}
-
-fn off_within_the_slower(off_at: Option<u64>, bounds: &[(u64, u64)]) -> bool {
-    let latest = bounds.iter().map(|(at, _)| *at).max().unwrap_or(0);
-    let slowest = bounds.iter().map(|(_, bound)| *bound).max().unwrap_or(0);
-    off_at.is_some_and(|off| off < latest + slowest)
 }
 
 /// Cycles until a plate that is off has rung down to 5 %: three ring times, and two cycles on the way.

@@ -48,11 +48,8 @@ pub fn mean(samples: &[Values], path: &[f64], times: &[f64]) -> (Values, Spread)
         let squares: f64 = samples.iter().filter_map(f).map(|v| (v - mean).powi(2)).sum();
         (squares / (n - 1.0)).sqrt()
     };
-    let spread = Spread {
-        normal_sd_n: sd(&|s| s.get(Id::NormalForce)),
-        lateral_sd_n: sd(&lateral),
-        samples: samples.len() as u64,
-    };
+    let (normal_sd_n, lateral_sd_n) = (sd(&|s| s.get(Id::NormalForce)), sd(&lateral));
+    let spread = Spread { normal_sd_n, lateral_sd_n, samples: samples.len() as u64 };
     let mut pass = samples[0].clone();
     pass.average(samples);
     pass.put_motion(velocity.abs(), direction, average(samples, lateral));
