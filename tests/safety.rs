@@ -4,8 +4,10 @@
 use models::prediction::SpringSlider;
 use models::quantity::PeakToPeak;
 use realtime::cycle::{Command, KEY_AGE, Marker, Phase};
-use realtime::ports::{Contacts, ForceSensor, Forces, Nanos, NoData, SafetyInputs};
-use realtime::safety::{Cause, Request};
+use realtime::ports::{
+    Amplifier, AmplifierState, Contacts, ForceSensor, Forces, Nanos, NoData, SafetyInputs,
+};
+use realtime::safety::{Cause, DriveCommand, Remark, Request};
 use realtime::turn::{Ports, Row};
 use runs::plan::{Plan, Resolution};
 use runs::sequence::{Event, MeasuredPass, Outcome, Sequence};
@@ -147,8 +149,31 @@ impl<F: ForceSensor> ForceSensor for Stuck<F> {
     }
 }
 
+/// An amplifier whose plate shows a share of its amplitude.
+struct Damped<A> {
+    amplifier: A,
+    share: f64,
+}
+
+impl<A: Amplifier> Amplifier for Damped<A> {
+    fn command(&mut self, command: DriveCommand, now: Nanos) {
+        self.amplifier.command(command, now);
+    }
+    fn state(&mut self, now: Nanos) -> Result<AmplifierState, NoData> {
+        let mut state = self.amplifier.state(now)?;
+        state.amplitude.iter_mut().for_each(|read| read.value *= self.share);
+        Ok(state)
+    }
+}
+
+type Swept = (Vec<MeasuredPass>, Vec<Event>, Vec<(u32, f64)>, Outcome);
+
 /// Passes, events, when each point was measured, and the outcome, of a sweep with a sensor that stands still.
-fn stuck(from_to: [f64; 2], frozen_after: u32) -> (Vec<MeasuredPass>, Vec<Event>, Vec<(u32, f64)>, Outcome) {
+fn stuck(from_to: [f64; 2], frozen_after: u32) -> Swept {
+    swept(from_to, frozen_after, 1.0)
+}
+
+fn swept(from_to: [f64; 2], frozen_after: u32, share: f64) -> Swept {
     let mut setup = Setup::load("virtual-ideal").unwrap();
     setup.config.limits.frozen_after = frozen_after;
     let plan = Plan::parse("plan.toml", TEN_PASSES).unwrap();
@@ -160,6 +185,7 @@ fn stuck(from_to: [f64; 2], frozen_after: u32) -> (Vec<MeasuredPass>, Vec<Event>
     let mut sequence = Sequence::new(points, plan.file.pass, Arc::clone(&model), &setup.tip, noise);
     let [force, amplifier, stage] = VirtualRig::new(&WorldConfig::ideal(), 1).unwrap().split();
     let force = Stuck { force, from_to, shown: None };
+    let amplifier = Damped { amplifier, share };
     let ports = Ports::new(Box::new(force), Box::new(amplifier), Box::new(stage));
     let mut rig = VirtualLoop::new(setup.config, model, ports);
     let (mut passes, mut events, mut measured) = (Vec::new(), Vec::new(), Vec::new());
@@ -198,6 +224,18 @@ fn a_pass_with_a_sensor_that_stands_still_does_not_count() {
     let (passes, _, _, outcome) = stuck([ends - 0.02, f64::MAX], u32::MAX);
     assert!(matches!(outcome, Outcome::Frozen { cause: Cause::LateralFrozen, .. }), "{outcome:?}");
     assert_eq!(passes.len(), 3);
+}
+
+/// The record alone had the remark.
+#[test]
+fn a_plate_that_moves_too_little_is_remarked_on_in_each_pass() {
+    let (passes, events, _, outcome) = swept([f64::MAX; 2], 50, 0.5);
+    assert_eq!((passes.len(), outcome), (10, Outcome::Complete));
+    let remarked = |event: &&Event| matches!(event, Event::Remarked { remark: Remark::AmplitudeSags, .. });
+    let remarked: Vec<&Event> = events.iter().filter(remarked).collect();
+    assert_eq!(remarked.len(), 10, "{events:?}");
+    assert!(runs::report::events::describe(remarked[0]).contains("less than 0.7 of the commanded amplitude"));
+    assert!(!swept([f64::MAX; 2], 50, 1.0).1.iter().any(|e| matches!(e, Event::Remarked { .. })));
 }
 
 #[test]

@@ -265,6 +265,17 @@ pub enum Remark {
     AmplitudeSags,
 }
 
+impl Remark {
+    /// What a person reads of it.
+    pub const fn words(self) -> &'static str {
+        match self {
+            Remark::LateralLossy => "more than 15 % of the lateral samples did not come",
+            Remark::NormalLossy => "more than 15 % of the normal samples did not come",
+            Remark::AmplitudeSags => "the plate moved less than 0.7 of the commanded amplitude",
+        }
+    }
+}
+
 /// Safety's memory. `Copy`: it can hold no lock, no heap and no handle.
 #[derive(Clone, Copy, Debug)]
 pub struct Safety {

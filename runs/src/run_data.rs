@@ -41,12 +41,18 @@ pub struct RunData {
 impl RunData {
     /// How the run ended, in words.
     pub fn ending(&self) -> String {
-        let Some(Summary { outcome, planned, .. }) = &self.summary else {
+        let Some(Summary { outcome, planned, links, .. }) = &self.summary else {
             return "The run has no ending: it was killed, or is still going".into();
         };
         let why = match outcome {
             Outcome::Complete => return format!("Complete: {} of {planned} passes", self.passes.len()),
-            Outcome::Tripped(trip) => format!("tripped, {trip}"),
+            Outcome::Tripped(trip) => {
+                let last = |(name, link): (&String, &serde_json::Value)| {
+                    let text = link["last_problem"].as_str().filter(|text| !text.is_empty())?;
+                    Some(format!("; last problem of `{name}`: {text}"))
+                };
+                format!("tripped, {trip}{}", links.iter().filter_map(last).collect::<String>())
+            }
             outcome => outcome.words(),
         };
         format!("Ended early after {} of {planned} passes: {why}", self.passes.len())

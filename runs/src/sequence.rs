@@ -32,7 +32,7 @@ use passing::Sums;
 use realtime::compare::{Agreement, Comparator, PassComparison};
 use realtime::cycle::{Command, Marker, Phase};
 use realtime::ports::{Nanos, NoData};
-use realtime::safety::{Cause, ChannelTiming, Limits, Request};
+use realtime::safety::{Cause, ChannelTiming, Limits, Remark, Request};
 use realtime::turn::Row;
 use std::sync::Arc;
 
@@ -130,6 +130,8 @@ pub struct Sequence {
     /// Certificates that are compared with the amplifier's temperature at the start of each pass.
     pub(crate) temperature_ranges: Vec<TemperatureRange>,
     temperature_flags: Vec<TemperatureFlag>,
+    /// What was remarked last, and of which pass.
+    remarked: Option<(u32, Remark)>,
     /// What the setup states of the air, and what the loop last received of it.
     ambient: Ambient,
     ambient_sent: Ambient,
@@ -178,6 +180,7 @@ impl Sequence {
             poisson_ratio: tip.finger.poisson_ratio,
             temperature_ranges: Vec::new(),
             temperature_flags: Vec::new(),
+            remarked: None,
             ambient: Ambient::default(),
             ambient_sent: Ambient::default(),
             at_rig: AtRig::default(),
@@ -393,13 +396,6 @@ impl Sequence {
         c.amplitude > PeakToPeak::ZERO && self.model.target().is_some()
     }
 
-    /// Half the stroke of a pass, m: it slides this far on either side of its position.
-    fn half_stroke_m(&self, point: &Point) -> f64 {
-        0.5 * (point.condition.speed_m_s
-            * self.times.sliding_s(point.edges, point.condition.speed_m_s)[0]
-            * 1.05)
-    }
-
     fn begin_next(&mut self, row: &Row, out: &mut Reaction) {
         if self.next == self.points.len() {
             self.sums = Sums::default();
@@ -459,7 +455,9 @@ impl Sequence {
         let point = self.points[self.next];
         let c = &point.condition;
         let Ok(stage) = row.inputs.seen.stage else { return };
-        let start = c.position_m - c.direction.sign() * self.half_stroke_m(&point);
+        // It slides half a stroke on either side of its position.
+        let stroke = c.speed_m_s * self.times.sliding_s(point.edges, c.speed_m_s)[0] * 1.05;
+        let start = c.position_m - c.direction.sign() * (0.5 * stroke);
         let away = start - stage.position_m;
         // Close enough: within 0.2 mm of the start, on either side.
         if away.abs() < 2e-4 {

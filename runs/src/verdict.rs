@@ -95,11 +95,6 @@ pub(crate) fn name(effects: &[String]) -> String {
     if effects.is_empty() { "no gap".into() } else { plain(&effects.join(" + ")) }
 }
 
-/// Odds in words, from their logarithm to the base 10.
-pub fn odds_base10(log: f64) -> String {
-    if log > 6.0 { "odds above 10^6 to 1".into() } else { format!("odds of {:.0} to 1", 10f64.powf(log)) }
-}
-
 /// A parameter's value with its interval, or as assumed where the table adds nothing to the prior.
 pub fn estimate(p: &Estimate) -> String {
     match p.shape {
@@ -121,7 +116,8 @@ pub fn aliases(h: &Hypothesis) -> Option<String> {
 /// What an unknown departure looks like, a line a structure; none of structures that the best cause beats.
 pub fn looks_like(result: &Diagnosis) -> impl Iterator<Item = String> + '_ {
     let all = result.report.description.iter().filter(|d| d.leads());
-    all.map(|d| format!("{} ({} against no gap)", d.text, odds_base10(d.log10_odds_vs_no_gap)))
+    let odds = |log: f64| if log > 6.0 { "above 10^6".into() } else { format!("of {:.0}", 10f64.powf(log)) };
+    all.map(|d| format!("{} (odds {} to 1 against no gap)", d.text, odds(d.log10_odds_vs_no_gap)))
 }
 
 /// Regions with passes in which the gap shows, the largest first and no more than `most`; and a line that

@@ -75,6 +75,7 @@ pub fn describe(event: &Event) -> String {
             let why = cause.map_or("no contact", Cause::words);
             format!("pass {point} does not count: {why}; it is made again")
         }
+        Event::Remarked { point, remark } => format!("pass {point}: {}", remark.words()),
         Event::TemperatureBeyondCertificate { point, flag } => {
             format!("from pass {point}: {flag}; the passes are flagged and not corrected")
         }

@@ -7,7 +7,7 @@ use models::pass::Pass;
 use models::prediction::Regime;
 use realtime::compare::PassComparison;
 use realtime::ports::Nanos;
-use realtime::safety::{Cause, Trip};
+use realtime::safety::{Cause, Remark, Trip};
 use serde::{Deserialize, Serialize};
 
 /// A finished pass with its comparison: what the record and the report hold.
@@ -110,6 +110,13 @@ pub enum Event {
         /// The rule of the sensor that stood still; none for lost contact.
         #[serde(default, skip_serializing_if = "Option::is_none")]
         cause: Option<Cause>,
+    },
+    /// In this pass something was not as it should be: it counts, and the record has each such cycle.
+    Remarked {
+        /// Which.
+        point: u32,
+        /// What.
+        remark: Remark,
     },
     /// From this pass on a certificate does not hold at the temperature that the amplifier reports, or that
     /// is not known: every pass until it holds again carries the flag.
@@ -334,6 +341,7 @@ mod tests {
             Event::Paused { point: 1 },
             Event::Resumed,
             Event::PassRepeated { point: 1, cause: Some(cause) },
+            Event::Remarked { point: 1, remark: Remark::AmplitudeSags },
             Event::TemperatureBeyondCertificate { point: 1, flag },
             Event::TemperatureUnwatched { certificate: "c".into() },
             Event::Disarmed { supply_open: true },
@@ -365,7 +373,8 @@ mod tests {
                 Event::PauseTooLong { .. } | Event::PauseNotQuiet { .. } => {}
                 Event::ArmingDisturbed { .. } | Event::Zeros { .. } | Event::Tripped(_) => {}
                 Event::ModelDeparted { .. } | Event::Paused { .. } | Event::Resumed => {}
-                Event::PassRepeated { .. } | Event::TemperatureBeyondCertificate { .. } => {}
+                Event::PassRepeated { .. } | Event::Remarked { .. } => {}
+                Event::TemperatureBeyondCertificate { .. } => {}
                 Event::TemperatureUnwatched { .. } | Event::Disarmed { .. } | Event::OperatorStep { .. } => {}
                 Event::Answered { .. } | Event::Waited { .. } | Event::LevelSet { .. } => {}
                 Event::LevelReached { .. } | Event::LevelNotReached { .. } | Event::LevelLost { .. } => {}

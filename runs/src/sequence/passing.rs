@@ -99,6 +99,11 @@ impl Sequence {
             self.at_rig.during_pass();
         }
         let point = self.points[self.next];
+        let remark = row.remark.filter(|_| row.marker.phase == Phase::Measure).map(|r| (point.number, r));
+        if let Some((point, remark)) = remark.filter(|_| remark != self.remarked) {
+            out.events.push(Event::Remarked { point, remark });
+            self.remarked = Some((point, remark));
+        }
         if row.now.since(since) < Nanos::from_seconds(self.times.measured_s(point.condition.speed_m_s)) {
             return;
         }
