@@ -75,7 +75,7 @@ fn each_wrong_profile_is_refused_with_place_and_cause() {
         (
             "no time to answer",
             changed(RTU, "response_timeout_ms = 200", "response_timeout_ms = 0"),
-            "at least 1",
+            "above zero",
         ),
         (
             "an 'off' that is sent again after 5 s",

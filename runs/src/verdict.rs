@@ -117,7 +117,7 @@ pub fn aliases(h: &Hypothesis) -> Option<String> {
 pub fn looks_like(result: &Diagnosis) -> impl Iterator<Item = String> + '_ {
     let all = result.report.description.iter().filter(|d| d.leads());
     let odds = |log: f64| if log > 6.0 { "above 10^6".into() } else { format!("of {:.0}", 10f64.powf(log)) };
-    all.map(|d| format!("{} (odds {} to 1 against no gap)", d.text, odds(d.log10_odds_vs_no_gap)))
+    all.map(move |d| format!("{} (odds {} to 1 against no gap)", d.text, odds(d.log10_odds_vs_no_gap)))
 }
 
 /// Regions with passes in which the gap shows, the largest first and no more than `most`; and a line that

@@ -69,8 +69,8 @@ impl Sequence {
     /// Adds a row's fresh samples to the sums.
     pub(super) fn take(&mut self, row: &Row) {
         let seen = &row.inputs.seen;
-        let [lateral, normal] = &mut self.sums.raw;
-        (lateral.take(&seen.forces.lateral), normal.take(&seen.forces.normal));
+        self.sums.raw[0].take(&seen.forces.lateral);
+        self.sums.raw[1].take(&seen.forces.normal);
         if let (true, Ok(lateral), Ok(normal)) = (row.usable, &seen.forces.lateral, &seen.forces.normal)
             && self.sums.lateral_sequence != Some(lateral.sequence)
         {
