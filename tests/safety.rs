@@ -226,14 +226,14 @@ fn a_pass_with_a_sensor_that_stands_still_does_not_count() {
     assert_eq!(passes.len(), 3);
 }
 
-/// The record alone had the remark.
+/// The record alone had the remark. Here the first pass at an amplitude ends before the amplifier's response is over.
 #[test]
-fn a_plate_that_moves_too_little_is_remarked_on_in_each_pass() {
+fn a_plate_that_moves_too_little_is_remarked_on() {
     let (passes, events, _, outcome) = swept([f64::MAX; 2], 50, 0.5);
     assert_eq!((passes.len(), outcome), (10, Outcome::Complete));
-    let remarked = |event: &&Event| matches!(event, Event::Remarked { remark: Remark::AmplitudeSags, .. });
-    let remarked: Vec<&Event> = events.iter().filter(remarked).collect();
-    assert_eq!(remarked.len(), 10, "{events:?}");
+    let remarked: Vec<&Event> = events.iter().filter(|e| matches!(e, Event::Remarked { .. })).collect();
+    let of = |point: u32| Event::Remarked { point, remark: Remark::AmplitudeSags };
+    assert_eq!(remarked, [1, 3, 5, 7, 9].map(of).each_ref(), "{events:?}");
     assert!(runs::report::events::describe(remarked[0]).contains("less than 0.7 of the commanded amplitude"));
     assert!(!swept([f64::MAX; 2], 50, 1.0).1.iter().any(|e| matches!(e, Event::Remarked { .. })));
 }
