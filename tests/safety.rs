@@ -226,7 +226,7 @@ fn a_pass_with_a_sensor_that_stands_still_does_not_count() {
     assert_eq!(passes.len(), 3);
 }
 
-/// The record alone had the remark. Here the first pass at an amplitude ends before the amplifier's response is over.
+/// The record alone had the remark. Here the first pass at an amplitude ends before the amplifier's response.
 #[test]
 fn a_plate_that_moves_too_little_is_remarked_on() {
     let (passes, events, _, outcome) = swept([f64::MAX; 2], 50, 0.5);

@@ -12,6 +12,11 @@ pub fn plan(name: &str, reference_every: u32, amplitudes_pp_m: &[f64]) -> String
     timed_plan(name, reference_every, amplitudes_pp_m, [0.05, 0.05])
 }
 
+/// So many amplitudes of 2 um and some nm: a plan lists no level twice.
+pub fn some<const N: usize>() -> [f64; N] {
+    std::array::from_fn(|i| 2e-6 + 1e-9 * i as f64)
+}
+
 /// The same with s to settle and s to measure, repeated up to a thousand times in turn.
 pub fn timed_plan(name: &str, reference_every: u32, amplitudes_pp_m: &[f64], times_s: [f64; 2]) -> String {
     format!(

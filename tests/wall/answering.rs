@@ -25,7 +25,8 @@ impl Drop for Run {
 /// A run of minutes on the virtual rig, once it holds its folder.
 fn begun(folder: &Path, out: &Path) -> Run {
     let plan = folder.join("plan.toml");
-    std::fs::write(&plan, tests::served::timed_plan("long", 0, &[2e-6; 20], [0.1, 4.0])).unwrap();
+    std::fs::write(&plan, tests::served::timed_plan("long", 0, &tests::served::some::<20>(), [0.1, 4.0]))
+        .unwrap();
     let mut run = muprime();
     run.arg("run").arg(&plan).args(["--setup", &unhurried("virtual-ideal", folder), "--out"]).arg(out);
     let run = Run(run.stdout(Stdio::null()).stderr(Stdio::null()).spawn().unwrap());

@@ -83,7 +83,7 @@ impl Run {
     fn with(rig: &ServedRig, folder: &Path, name: &str, limits: &str, hand: Hand) -> Self {
         let (plan, file) = (folder.join("plan.toml"), folder.join(format!("{name}.toml")));
         let (out, stderr) = (folder.join(name), folder.join(format!("{name}.txt")));
-        std::fs::write(&plan, served::timed_plan("hand", 0, &[2e-6; 8], [0.1, 4.0])).unwrap();
+        std::fs::write(&plan, served::timed_plan("hand", 0, &served::some::<8>(), [0.1, 4.0])).unwrap();
         std::fs::write(&file, setup(rig, limits)).unwrap();
         let (mut master, slave) = terminal();
         let mut sweep = muprime();

@@ -136,7 +136,7 @@ fn struck(setup: &str, signal: i32, wait: Duration, folder: &Path) -> Result<Str
     std::fs::create_dir_all(folder).unwrap();
     let (plan, file, out) = (folder.join("plan.toml"), folder.join("setup.toml"), folder.join("run"));
     let mut rig = Rig::start(setup, folder);
-    std::fs::write(&plan, served::timed_plan("dies", 0, &[2e-6; 8], [0.1, 4.0])).unwrap();
+    std::fs::write(&plan, served::timed_plan("dies", 0, &served::some::<8>(), [0.1, 4.0])).unwrap();
     std::fs::write(&file, rig.reached(setup)).unwrap();
     let mut sweep = muprime();
     sweep.arg("run").arg(&plan).arg("--setup").arg(&file).arg("--out").arg(&out);

@@ -160,9 +160,10 @@ fn across(
     x: impl Fn(&Measured) -> Option<f64>,
     other: impl Fn(&Measured) -> Option<f64>,
 ) -> Result<(Effect, String), String> {
-    let rows = by_cell(sessions, |s| Some([x(s)?.ln(), s.mean_mu()?, other(s).map_or(f64::NAN, f64::ln)]));
+    let row = |s: &Measured| Some([s.mean_mu()?, x(s)?.ln(), other(s).map_or(f64::NAN, f64::ln)]);
+    let (rows, least) = by_cell(sessions, row);
     let column = |i: usize| rows.iter().map(|row| row[i]).collect::<Vec<f64>>();
-    let (x, y, other) = (column(0), column(1), column(2));
+    let (y, x, other) = (column(0), column(1), column(2));
     let [low, high] = ends(&x);
     let factor = (high - low).exp();
     if factor.is_nan() || factor < LEAST_FACTOR {
@@ -170,7 +171,7 @@ fn across(
     }
     let varies = ends(&other);
     let other = (varies[1] - varies[0] > LEAST_FACTOR.ln()).then_some(other.as_slice());
-    let effect = Effect::slope(&x, &y, other)
+    let effect = Effect::slope(&x, &y, other, least)
         .ok_or_else(|| format!("too few cells, or {words} changes with something else"))?;
     Ok((effect, format!("{words} over a factor of {}", number(factor))))
 }
@@ -201,32 +202,39 @@ fn beside<M: FrictionModel>(
     Ok((effect, format!("measured less predicted by {words}")))
 }
 
-/// The mean of a cell's sessions, for each cell: days of one tip do not tell how tips differ.
+/// The mean of a cell's sessions, for each cell: days of one tip do not tell how tips differ. And the
+/// variance of such a mean of the first value by the scatter of sessions: few cells may lie closer by chance.
 fn by_cell<const N: usize>(
     sessions: &[Measured],
     of: impl Fn(&Measured) -> Option<[f64; N]>,
-) -> Vec<[f64; N]> {
+) -> (Vec<[f64; N]>, f64) {
     let mut cells = BTreeMap::<usize, Vec<[f64; N]>>::new();
-    for s in sessions {
-        cells.entry(s.session.cell).or_default().extend(of(s));
+    for (cell, row) in sessions.iter().filter_map(|s| Some((s.session.cell, of(s)?))) {
+        cells.entry(cell).or_default().push(row);
     }
     let mean =
         |rows: &Vec<[f64; N]>| std::array::from_fn(|i| mean(rows.iter().map(|r| r[i])).unwrap_or(f64::NAN));
-    cells.values().filter(|rows| !rows.is_empty()).map(mean).collect()
+    let means: Vec<[f64; N]> = cells.values().map(mean).collect();
+    let squares = |(rows, mean): (&Vec<[f64; N]>, &[f64; N])| -> f64 {
+        rows.iter().map(|row| (row[0] - mean[0]).powi(2)).sum()
+    };
+    let squares: f64 = cells.values().zip(&means).map(squares).sum();
+    let (all, cells) = (cells.values().map(Vec::len).sum::<usize>() as f64, means.len() as f64);
+    (means, if all > cells { squares / (all - cells) * cells / all } else { 0.0 })
 }
 
 /// How far human and artificial tips lie apart beside one law.
 fn kinds(sessions: &[Measured]) -> Result<(Effect, String), String> {
-    let of = |human: bool| -> Vec<f64> {
+    let of = |human: bool| {
         let departure = |s: &Measured| {
             let own = s.kind != FingertipKind::Probe && (s.kind == FingertipKind::Human) == human;
             let law = EmpiricalPsi::paper(s.finger).ok().filter(|_| own)?;
             let beside = |d: &Driven| Some(d.mu - law.relative_friction(&d.condition).ok()?.mu_relative);
             Some([mean(s.driven.iter().filter_map(beside))?])
         };
-        by_cell(sessions, departure).concat()
+        by_cell(sessions, departure)
     };
-    let effect = Effect::between(&of(true), &of(false))
+    let effect = Effect::between(of(true), of(false))
         .ok_or_else(|| "two cells or more of each kind of tip are needed".to_string())?;
     Ok((effect, "human less artificial, beside Eq. 20".to_string()))
 }

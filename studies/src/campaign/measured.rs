@@ -114,17 +114,20 @@ impl Effect {
         Effect::new(m, variance.sqrt(), n - 1.0, shared, values.len())
     }
 
-    /// Difference of the means of two groups, Welch's.
-    pub fn between(a: &[f64], b: &[f64]) -> Option<Self> {
+    /// Difference of the means of two groups of cells, Welch's; beside each its cells' least variance.
+    pub fn between((a, least_a): (Vec<[f64; 1]>, f64), (b, least_b): (Vec<[f64; 1]>, f64)) -> Option<Self> {
+        let (a, b) = (a.as_flattened(), b.as_flattened());
         let ((ma, va, na), (mb, vb, nb)) = (mean_and_variance(a)?, mean_and_variance(b)?);
+        let (va, vb) = (va.max(least_a / na), vb.max(least_b / nb));
         let freedom =
             (va + vb).powi(2) / (va * va / (na - 1.0) + vb * vb / (nb - 1.0)).max(f64::MIN_POSITIVE);
         Effect::new(ma - mb, (va + vb).sqrt(), freedom.clamp(1.0, 1e6), 0.0, a.len() + b.len())
     }
 
     /// Change over the range of `x` by a straight line through one point a cell, others of its covariates
-    /// held; `None` with too few cells, or where `x` and another change together.
-    pub fn slope(x: &[f64], y: &[f64], other: Option<&[f64]>) -> Option<Self> {
+    /// held; a point has the variance `least` at least. `None` with too few cells, or where `x` and another
+    /// change together.
+    pub fn slope(x: &[f64], y: &[f64], other: Option<&[f64]>, least: f64) -> Option<Self> {
         let one: Vec<f64> = vec![1.0; x.len()];
         let centred = |v: &[f64]| without(v, &one);
         let (mut x0, mut y0) = (centred(x), centred(y));
@@ -141,7 +144,7 @@ impl Effect {
         let left = x0.iter().zip(&y0).map(|(x, y)| (y - slope * x).powi(2)).sum::<f64>();
         let [low, high] = ends(x);
         let range = high - low;
-        Effect::new(slope * range, range * (left / freedom / xx).sqrt(), freedom, 0.0, n)
+        Effect::new(slope * range, range * ((left / freedom).max(least) / xx).sqrt(), freedom, 0.0, n)
     }
 }
 
