@@ -103,7 +103,9 @@ fn answers_are_right_on_three_natures() {
                 continue;
             }
             (said, wrong) = (said + all.len(), wrong + count(other));
-            if truth.abs() < 0.2 * margin || truth.abs() > 2.0 * margin {
+            // Four cells leave one or two degrees of freedom between tips: no answer is owed there.
+            let between = ["modulus", "human and artificial"].contains(name);
+            if !between && (truth.abs() < 0.2 * margin || truth.abs() > 2.0 * margin) {
                 (owed, decided) = (owed + all.len(), decided + all.len() - count(Answer::Undecided));
             }
         }
