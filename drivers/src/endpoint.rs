@@ -360,8 +360,8 @@ impl Endpoint {
             }
             *held = holds;
         }
-        let stops = |index: &usize| self.profile.description.fault[*index].severity == Severity::Stop;
-        let fault = self.profile.fault(&self.values).filter(stops);
+        let faults = self.holds.iter().zip(&self.profile.description.fault);
+        let fault = faults.into_iter().position(|(holds, fault)| *holds && fault.severity == Severity::Stop);
         if fault != self.fault {
             self.fault = fault;
             let fault = fault.map(|index| &self.profile.description.fault[index]);

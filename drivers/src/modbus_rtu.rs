@@ -8,7 +8,7 @@
 
 use super::ended::{BAD_IN_A_ROW, Closed, Ended};
 use super::modbus::{Blocks, Conversation, Registers, Trouble};
-use super::off::{Hurry, OFF_WAITS_MS};
+use super::off::{OFF_WAITS_MS, PendingOff};
 use super::serial::{Line, SharedLine};
 use super::session::Session;
 use super::setup::InstrumentSetup;
@@ -33,7 +33,7 @@ pub(crate) fn spawn(instrument: &InstrumentSetup, session: Session) -> Result<Jo
     }
     session.spawn(move |session| {
         let mut wire = Rtu::open(&path, baud, link.line_format(), unit, link.response_timeout_ms)?;
-        wire.hurry = session.hurry.clone();
+        wire.pending_off = session.pending_off.clone();
         let health = session.endpoint.health();
         health.count(&health.connections);
         let stream = session.endpoint.profile().description.stream.clone();
@@ -46,7 +46,7 @@ pub(crate) fn spawn(instrument: &InstrumentSetup, session: Session) -> Result<Jo
         }
         // Whatever an earlier connection was still owed comes now or never.
         let longest = link.patience();
-        wire.line.with(|line| line.drain(longest, 10 * longest, &Hurry::default()))?;
+        wire.line.with(|line| line.drain(longest, 10 * longest, &PendingOff::default()))?;
         let conversation = Conversation::begin(session, &mut wire)?;
         match stream {
             None => conversation.go_on(session, rate_hz),
@@ -67,7 +67,7 @@ pub struct Rtu {
     answer_ms: u32,
     quiet_ms: u32,
     silence: f64,
-    hurry: Hurry,
+    pending_off: PendingOff,
 }
 
 impl Rtu {
@@ -77,8 +77,8 @@ impl Rtu {
     /// Where the port is not there, is in use, or the format makes no sense.
     pub fn open(path: &str, baud: u32, format: &str, unit: u8, answer_ms: u32) -> Result<Self, Ended> {
         let line = SharedLine::open(path, baud, format)?;
-        let (silence, hurry) = (rtu::silence_s(baud), Hurry::default());
-        Ok(Rtu { line, unit, answer_ms, quiet_ms: answer_ms, silence, hurry })
+        let (silence, pending_off) = (rtu::silence_s(baud), PendingOff::default());
+        Ok(Rtu { line, unit, answer_ms, quiet_ms: answer_ms, silence, pending_off })
     }
 
     /// Writes the safe set-points, every block of them, and needs no answer. The 'off' that is answered and read back follows.
@@ -89,7 +89,7 @@ impl Rtu {
             if n > 0 {
                 // One at a time has the line: where there is an answer to the one before, it is let through.
                 let answer = Duration::from_millis(u64::from(self.answer_ms.min(OFF_WAITS_MS)));
-                self.line.with(|line| line.drain(answer, 2 * answer, &self.hurry))?;
+                self.line.with(|line| line.drain(answer, 2 * answer, &self.pending_off))?;
             }
             std::thread::sleep(Duration::from_secs_f64(self.silence));
             let request = write_request(self.unit, block.table, block.address, words);
@@ -100,7 +100,7 @@ impl Rtu {
 
     /// One request and its answer.
     fn ask(&mut self, request: &Request) -> Result<Vec<u8>, Trouble> {
-        let (answer_ms, hurry) = (self.answer_ms, &self.hurry);
+        let (answer_ms, pending_off) = (self.answer_ms, &self.pending_off);
         let silence = Duration::from_secs_f64(self.silence);
         let exchange = |line: &mut Line| {
             line.write(&request.bytes)?;
@@ -108,10 +108,10 @@ impl Rtu {
             let mut answer = Vec::with_capacity(request.answer_length);
             let mut buffer = [0; 260];
             loop {
-                let count = line.read(&mut buffer, hurry.look(&mut deadline))?;
+                let count = line.read(&mut buffer, pending_off.look(&mut deadline))?;
                 if count == 0 && Instant::now() >= deadline {
                     return Err(match answer.len() {
-                        0 => Ended::Timeout(hurry.limit_ms(answer_ms)),
+                        0 => Ended::Timeout(pending_off.limit_ms(answer_ms)),
                         n => Ended::Cut(format!(
                             "{n} bytes came in place of {}: {}: are baud and format right, and `unit` one of its own?",
                             request.answer_length,
@@ -137,7 +137,7 @@ impl Rtu {
             RtuError::Exception(code) => Trouble::Refused(super::remedy::exception(code)),
             other => {
                 let quiet = Duration::from_millis(u64::from(self.quiet_ms));
-                match self.line.with(|line| line.drain(quiet, 10 * quiet, &self.hurry)) {
+                match self.line.with(|line| line.drain(quiet, 10 * quiet, &self.pending_off)) {
                     Ok(_) => Trouble::Corrupt(other.to_string()),
                     Err(ended) => Trouble::Ended(ended),
                 }
@@ -151,7 +151,7 @@ impl Rtu {
         for _ in 0..STOP_TRIES {
             self.line.with(|line| line.write(&vec![byte; usize::from(count)]))?;
             let settle = Duration::from_millis(u64::from(stream.settle_ms));
-            if self.line.with(|line| line.drain(settle, settle * 3, &self.hurry))? {
+            if self.line.with(|line| line.drain(settle, settle * 3, &self.pending_off))? {
                 return Ok(());
             }
         }
@@ -252,8 +252,14 @@ mod tests {
         let session = Session::new(endpoint, Instant::now(), Arc::default(), ready);
         let (mut instrument, driver) = TTYPort::pair().unwrap();
         let line = SharedLine::open(&driver.name().unwrap(), 115_200, "8N1").unwrap();
-        let mut wire =
-            Rtu { line, unit: 2, answer_ms: 5, quiet_ms: 5, silence: 1e-3, hurry: Hurry::default() };
+        let mut wire = Rtu {
+            line,
+            unit: 2,
+            answer_ms: 5,
+            quiet_ms: 5,
+            silence: 1e-3,
+            pending_off: PendingOff::default(),
+        };
         wire.send_unanswered_off(&session).unwrap();
         instrument.set_timeout(Duration::from_millis(50)).unwrap();
         let (mut heard, mut buffer) = (Vec::new(), [0; 256]);
@@ -271,10 +277,11 @@ mod tests {
         let (mut instrument, driver) = TTYPort::pair().unwrap();
         let line = SharedLine::open(&driver.name().unwrap(), 115_200, "8N1").unwrap();
         let hour_ms = 3_600_000;
-        let hurry = Hurry::default();
-        let mut wire = Rtu { line, unit: 2, answer_ms: hour_ms, quiet_ms: hour_ms, silence: 1e-3, hurry };
-        wire.hurry.commands.handed_out(true);
-        wire.hurry.stop.store(true, std::sync::atomic::Ordering::Release);
+        let pending_off = PendingOff::default();
+        let mut wire =
+            Rtu { line, unit: 2, answer_ms: hour_ms, quiet_ms: hour_ms, silence: 1e-3, pending_off };
+        wire.pending_off.commands.handed_out(true);
+        wire.pending_off.stop.store(true, std::sync::atomic::Ordering::Release);
         let read = wire.read(Table::Holding, 0, 2);
         assert!(matches!(read, Err(Trouble::Ended(Ended::Timeout(OFF_WAITS_MS)))), "{read:?}");
         instrument.write_all(&[2, 3, 4, 0, 0, 0, 0, 0, 0]).unwrap();

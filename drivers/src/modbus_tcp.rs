@@ -7,7 +7,7 @@
 
 use super::ended::{AddressError, Closed, Ended};
 use super::modbus::{Conversation, Registers, Trouble};
-use super::off::{Hurry, LOOK_EVERY};
+use super::off::{LOOK_EVERY, PendingOff};
 use super::session::Session;
 use super::setup::InstrumentSetup;
 use super::trace::Traced;
@@ -33,7 +33,7 @@ pub(crate) fn spawn(instrument: &InstrumentSetup, session: Session) -> Result<Jo
     session.spawn(move |session| {
         let clock = session.clock.clock().clone();
         let mut wire = Tcp::connect((&runtime, &clock), address, unit, connect_ms, answer_ms)?;
-        wire.hurry = session.hurry.clone();
+        wire.pending_off = session.pending_off.clone();
         let health = session.endpoint.health();
         health.count(&health.connections);
         Conversation::begin(session, &mut wire)?.go_on(session, rate_hz)
@@ -61,7 +61,7 @@ pub fn resolve(address: &str, port: Option<u16>) -> Result<SocketAddr, AddressEr
 /// Runs one request against its deadline: an 'off' that waits brings it nearer, a held clock does not.
 fn within<T>(
     (runtime, clock): (&Runtime, &Clock),
-    (limit_ms, hurry): (u32, &Hurry),
+    (limit_ms, pending_off): (u32, &PendingOff),
     request: impl Future<Output = T>,
 ) -> Result<T, Ended> {
     let by = |limit_ms: u32| clock.now().plus(Nanos(u64::from(limit_ms) * 1_000_000));
@@ -69,13 +69,13 @@ fn within<T>(
     runtime.block_on(async {
         let mut request = std::pin::pin!(request);
         loop {
-            deadline = deadline.min(by(hurry.limit_ms(limit_ms)));
+            deadline = deadline.min(by(pending_off.limit_ms(limit_ms)));
             let left = Duration::from_nanos(deadline.since(clock.now()).0).min(LOOK_EVERY);
             if let Ok(answer) = tokio::time::timeout(left, request.as_mut()).await {
                 return Ok(answer);
             }
             if deadline <= clock.now() {
-                return Err(Ended::Timeout(hurry.limit_ms(limit_ms)));
+                return Err(Ended::Timeout(pending_off.limit_ms(limit_ms)));
             }
         }
     })
@@ -86,7 +86,7 @@ pub struct Tcp<'a> {
     runtime: (&'a Runtime, &'a Clock),
     context: Context,
     answer_ms: u32,
-    pub(crate) hurry: Hurry,
+    pub(crate) pending_off: PendingOff,
 }
 
 impl<'a> Tcp<'a> {
@@ -101,8 +101,8 @@ impl<'a> Tcp<'a> {
         connect_ms: u32,
         answer_ms: u32,
     ) -> Result<Self, Ended> {
-        let hurry = Hurry::default();
-        let context = within(runtime, (connect_ms, &hurry), async move {
+        let pending_off = PendingOff::default();
+        let context = within(runtime, (connect_ms, &pending_off), async move {
             let stream = tokio::net::TcpStream::connect(address).await?;
             stream.set_nodelay(true)?;
             // When the connection is dropped, what the kernel still holds is discarded: a command
@@ -112,7 +112,7 @@ impl<'a> Tcp<'a> {
             Ok(tcp::attach_slave(traced, Slave(unit)))
         })?
         .map_err(|error: std::io::Error| Ended::from(error))?;
-        Ok(Tcp { runtime, context, answer_ms, hurry })
+        Ok(Tcp { runtime, context, answer_ms, pending_off })
     }
 }
 
@@ -160,7 +160,7 @@ fn part<T>(answer: Result<tokio_modbus::Result<T>, Ended>) -> Result<T, Trouble>
 
 impl Registers for Tcp<'_> {
     fn read(&mut self, table: Table, address: u16, count: u16) -> Result<Vec<u8>, Trouble> {
-        let (runtime, limit, wire) = (self.runtime, (self.answer_ms, &self.hurry), &mut self.context);
+        let (runtime, limit, wire) = (self.runtime, (self.answer_ms, &self.pending_off), &mut self.context);
         let bits = |bits: Vec<bool>| bits.into_iter().map(u16::from).collect();
         let registers: Vec<u16> = match table {
             Table::Holding => part(within(runtime, limit, wire.read_holding_registers(address, count)))?,
@@ -172,7 +172,7 @@ impl Registers for Tcp<'_> {
     }
 
     fn write(&mut self, table: Table, address: u16, registers: &[u16]) -> Result<(), Trouble> {
-        let (runtime, limit) = (self.runtime, (self.answer_ms, &self.hurry));
+        let (runtime, limit) = (self.runtime, (self.answer_ms, &self.pending_off));
         if table.is_bits() {
             let coils: Vec<bool> = registers.iter().map(|register| *register != 0).collect();
             return part(within(runtime, limit, self.context.write_multiple_coils(address, &coils)));

@@ -16,29 +16,29 @@ use std::time::{Duration, Instant};
 
 /// An answer on the way to 'off' may take this long, in ms, where the profile allows less: a slow answer is still one.
 pub const OFF_ANSWER_MS: u32 = 600;
-/// An 'off' waits so long for a pending answer, in ms; then the connection is made anew, and it leaves first.
-/// A state comes ten times a second at least, so an answer that takes longer is of no use.
+/// Longest time that an 'off' waits for the answer to an earlier request, in ms. Then the link connects again and
+/// sends the 'off' first. A state comes ten times a second at least: a later answer has no use.
 pub const OFF_WAITS_MS: u32 = 100;
-/// Whoever waits for an answer looks so often whether an 'off' waits.
+/// A link that waits for an answer checks so often whether an 'off' is pending.
 pub(crate) const LOOK_EVERY: Duration = Duration::from_millis(10);
 /// Pause between two tries.
 const AGAIN: Duration = Duration::from_millis(4);
 
-/// Whether an 'off' waits for an instrument that drives or moves: for who waits for an answer of it.
+/// Whether an 'off' is pending for an instrument that drives or moves: it shortens the wait for an answer.
 #[derive(Clone, Default)]
-pub struct Hurry {
+pub struct PendingOff {
     pub(crate) commands: Mailbox<SetPoint>,
     pub(crate) stop: Arc<AtomicBool>,
 }
 
-impl Hurry {
+impl PendingOff {
     /// How long the answer may take, in ms, of the `answer_ms` that it may take otherwise.
     pub fn limit_ms(&self, answer_ms: u32) -> u32 {
         let off_waits = || self.commands.off_waits() || self.stop.load(Ordering::Acquire);
         if self.commands.drives() && off_waits() { answer_ms.min(OFF_WAITS_MS) } else { answer_ms }
     }
 
-    /// Until when to wait before looking again. An 'off' that waits brings `deadline` nearer.
+    /// When to check again. A pending 'off' brings `deadline` nearer.
     pub(crate) fn look(&self, deadline: &mut Instant) -> Instant {
         let now = Instant::now();
         *deadline = (*deadline).min(now + Duration::from_millis(self.limit_ms(u32::MAX).into()));

@@ -1,7 +1,7 @@
 //! Serial lines.
 
 use super::ended::Ended;
-use super::off::Hurry;
+use super::off::PendingOff;
 use super::trace;
 use serialport::{DataBits, Parity, SerialPort, StopBits};
 use std::io::{Read, Write};
@@ -73,11 +73,16 @@ impl Line {
     ///
     /// # Errors
     /// Where the port is gone.
-    pub fn drain(&mut self, quiet: Duration, most: Duration, hurry: &Hurry) -> Result<bool, Ended> {
+    pub fn drain(
+        &mut self,
+        quiet: Duration,
+        most: Duration,
+        pending_off: &PendingOff,
+    ) -> Result<bool, Ended> {
         let (mut silent, mut end) = (Instant::now() + quiet, Instant::now() + most);
         let mut buffer = [0; 512];
         while Instant::now() < end {
-            if self.read(&mut buffer, hurry.look(&mut end).min(silent))? > 0 {
+            if self.read(&mut buffer, pending_off.look(&mut end).min(silent))? > 0 {
                 silent = Instant::now() + quiet;
             } else if Instant::now() >= silent {
                 return Ok(true);

@@ -7,7 +7,7 @@
 
 use super::ended::{Closed, Ended, OFF_WITHIN};
 use super::endpoint::Endpoint;
-use super::off::Hurry;
+use super::off::PendingOff;
 use realtime::clock::{Clock, Participant};
 use realtime::pacing::panic_message;
 use realtime::ports::{Nanos, NoData};
@@ -60,8 +60,8 @@ pub struct Session {
     pub clock: Participant,
     /// Set when the thread is to send the safe set-points and end.
     pub stop: Arc<AtomicBool>,
-    /// Tells who waits for an answer that an 'off' waits.
-    pub hurry: Hurry,
+    /// Whether an 'off' is pending.
+    pub pending_off: PendingOff,
     /// Takes the outcome of the first connection, once.
     pub ready: Option<SyncSender<Result<(), Ended>>>,
     /// When the thread is to be done with switching off; known from the moment that it sees `stop`.
@@ -76,8 +76,15 @@ impl Session {
         stop: Arc<AtomicBool>,
         ready: SyncSender<Result<(), Ended>>,
     ) -> Self {
-        let hurry = endpoint.hurry(&stop);
-        Self { endpoint, clock: clock.into().join(SLACK), stop, hurry, ready: Some(ready), off_by: None }
+        let pending_off = endpoint.pending_off(&stop);
+        Self {
+            endpoint,
+            clock: clock.into().join(SLACK),
+            stop,
+            pending_off,
+            ready: Some(ready),
+            off_by: None,
+        }
     }
 
     /// Whether no connection has given a sample yet: nothing was commanded then, and nothing may be.

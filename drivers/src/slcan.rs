@@ -1,7 +1,7 @@
 //! CAN through a serial adapter (slcan).
 
 use super::ended::Ended;
-use super::off::Hurry;
+use super::off::PendingOff;
 use super::serial::Line;
 use instruments::bus::{CanEvent, CanPort};
 use instruments::codec::can::{CanFrame, SlcanReader, slcan_line, slcan_speed};
@@ -27,7 +27,7 @@ impl Slcan {
         // Adapters of this kind are USB: the symbol rate of the line means nothing to them.
         let mut line = Line::open(path, 115_200, "8N1")?;
         line.write(b"\rC\r")?;
-        line.drain(Duration::from_millis(20), Duration::from_millis(200), &Hurry::default())?;
+        line.drain(Duration::from_millis(20), Duration::from_millis(200), &PendingOff::default())?;
         line.write(&[b'S', speed, b'\r', b'O', b'\r'])?;
         Ok(Self { line, reader: SlcanReader::default(), waiting: VecDeque::new() })
     }

@@ -168,9 +168,9 @@ impl Talk {
             if let Some(line) = first_line(&mut self.came, &end)? {
                 return Ok(String::from_utf8_lossy(&line).trim().to_string());
             }
-            if !self.take(session.hurry.look(&mut deadline))? && Instant::now() >= deadline {
+            if !self.take(session.pending_off.look(&mut deadline))? && Instant::now() >= deadline {
                 return Err(match self.came.is_empty() {
-                    true => Ended::Timeout(session.hurry.limit_ms(self.patience_ms)),
+                    true => Ended::Timeout(session.pending_off.limit_ms(self.patience_ms)),
                     false => Ended::Cut(remedy::unended(&self.came, &end, &self.request)),
                 });
             }
@@ -184,9 +184,9 @@ impl Talk {
         loop {
             self.unasked(session);
             if self.came.len() < length {
-                if !self.take(session.hurry.look(&mut deadline))? && Instant::now() >= deadline {
+                if !self.take(session.pending_off.look(&mut deadline))? && Instant::now() >= deadline {
                     return Err(match self.came.len() {
-                        0 => Ended::Timeout(session.hurry.limit_ms(self.patience_ms)),
+                        0 => Ended::Timeout(session.pending_off.limit_ms(self.patience_ms)),
                         n => Ended::Cut(format!(
                             "{n} bytes came in place of {length}: {}",
                             remedy::shown(&self.came)

@@ -5,7 +5,7 @@
 //! decoders differently, and a wrong one gives a plausible wrong amplitude, so their names are queried first.
 
 use super::library::Source;
-use super::off::Hurry;
+use super::off::PendingOff;
 use super::serial::Line;
 use super::stream::first_line;
 use super::{Ended, OpenError};
@@ -128,7 +128,9 @@ pub fn settings(setup: &VibrometerSetup) -> Result<Settings, OpenError> {
     let mut talk = Talk { line, link, came: Vec::new() };
     // Ends a line that an earlier program left incomplete.
     talk.line.write(talk.link.tx_end().as_bytes()).map_err(failed)?;
-    talk.line.drain(Duration::from_millis(100), Duration::from_secs(1), &Hurry::default()).map_err(failed)?;
+    talk.line
+        .drain(Duration::from_millis(100), Duration::from_secs(1), &PendingOff::default())
+        .map_err(failed)?;
     let mut decoders = Vec::new();
     for number in 0..choice.most {
         match talk.ask(&choice.ask.replace("{which}", &number.to_string())) {

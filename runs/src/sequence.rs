@@ -202,7 +202,6 @@ impl Sequence {
             has_watchdog: limits.amplifier_watchdog || limits.supply_watchdog,
             arming: self.arming.guarded_by(limits),
             load_commanded: limits.load_commanded,
-            frozen_after: limits.frozen_after,
             approach: Approach::at(limits.timing.cycle, &limits.timing.stage),
             ..self
         }

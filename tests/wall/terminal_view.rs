@@ -190,8 +190,9 @@ fn a_run_is_seen_paused_and_resumed_from_two_terminals() {
     });
 }
 
-/// One key stops, from the run's own view and from another process's; SIGTERM, SIGHUP and SIGQUIT give the
-/// terminal back; a terminal whose window is closed, which sends a SIGHUP and takes nothing any more, ends the run as a stop does: drive off, passes kept.
+/// One key stops, from the run's own view and from another process's. SIGTERM, SIGHUP and SIGQUIT give the
+/// terminal back. A terminal whose window is closed sends a SIGHUP and reads nothing any more: the run ends
+/// as by a stop, with the drive off and the passes kept.
 #[test]
 fn one_key_stops_and_signals_give_the_terminal_back() {
     for how in ["own s", "own Ctrl-C", "other s", "SIGTERM", "SIGHUP", "SIGQUIT", "closed"] {

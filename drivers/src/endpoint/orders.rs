@@ -7,7 +7,7 @@
 use super::{ALARM_HOLDS, Endpoint, Part};
 use crate::Role;
 use crate::mailbox::Mailbox;
-use crate::off::Hurry;
+use crate::off::PendingOff;
 use crate::ports::SetPoint;
 use instruments::{Profile, SetId};
 use realtime::ports::{Nanos, NoData};
@@ -204,9 +204,9 @@ impl Endpoint {
         }
     }
 
-    /// What tells who waits for an answer that an 'off' waits, or that `stop` was set.
-    pub(crate) fn hurry(&self, stop: &Arc<AtomicBool>) -> Hurry {
-        Hurry { commands: self.orders.commands.clone(), stop: Arc::clone(stop) }
+    /// Whether an 'off' is pending, or `stop` was set.
+    pub(crate) fn pending_off(&self, stop: &Arc<AtomicBool>) -> PendingOff {
+        PendingOff { commands: self.orders.commands.clone(), stop: Arc::clone(stop) }
     }
 
     /// What the instrument is to the rig.

@@ -275,6 +275,13 @@ fn a_fault_and_a_wrong_instrument_are_shown_with_what_was_read() {
     sets(&mut endpoint, 5, true);
     let reported = endpoint.health().report().reported;
     assert_eq!(reported.get(&fault.text), Some(&2), "it came twice: {reported:?}");
+    // One of severity `log` stops nothing, and is counted.
+    let mut profile = profile("muprime-amplifier").unwrap();
+    profile.description.fault.iter_mut().for_each(|fault| fault.severity = Severity::Log);
+    let (mut logs, _port) =
+        Endpoint::amplifier(profile, &InstrumentSetup::new("muprime-amplifier", "")).unwrap();
+    assert_eq!(sets(&mut logs, 1, true), "");
+    assert_eq!(logs.health().report().reported.get(&fault.text), Some(&1));
     let mut other = state(6, false);
     other[0] = 0;
     let Err(BadFrame::WrongInstrument(why)) = endpoint.frame(frame, &other, Nanos(9)) else { panic!() };

@@ -262,7 +262,8 @@ impl Sequence {
             simulated: setup.file.virtual_rig.is_some(),
             ..AtRig::default()
         };
-        Sequence { at_rig, ambient: setup.file.stated_air(), ..self }
+        let frozen_after = setup.config.limits.frozen_after;
+        Sequence { at_rig, ambient: setup.file.stated_air(), frozen_after, ..self }
     }
 
     /// Which quantities something has to read for this sweep: those that no person types.

@@ -42,7 +42,8 @@ pub fn page(file: &CampaignFile, made: &[Measured]) -> miette::Result<(String, V
     w.push_str(&note(
         "The change of \u{3bc}' with its 95 % interval over sessions, or over cells where cells differ in it (mu_0, modulus, kind \
          of tip). It falls or rises where the whole interval lies beyond the margin, it does not matter where the whole interval \
-         lies within, and else it is undecided: then a change beyond the last column would have been decided. Statements are those of Vezzoli et al., in words of this page.",
+         lies within, and else it is undecided: then a change beyond the last column would have been decided. Statements are \
+         those of Vezzoli et al., in words of this page.",
     ));
     w.push_str("<h2>Relative friction by factor</h2>\n<div class=\"panels\">");
     for factor in FACTORS {
