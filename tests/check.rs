@@ -279,6 +279,30 @@ fn damaged_records_are_refused_and_whole_ones_are_known() {
     }
 }
 
+/// The folder of a run whose rig.toml is gone was OK, three verbs refused it without a word on what to do, and the
+/// command of the run left it as it was.
+#[test]
+fn a_rig_file_that_is_gone_is_told_and_the_command_of_the_run_writes_it_again() {
+    let made = Made::new();
+    let (run, rig) = (made.at("run"), made.at("run/rig.toml"));
+    let whole = std::fs::read(&rig).unwrap();
+    std::fs::remove_file(&rig).unwrap();
+    let (code, said) = checked(&[], &run);
+    assert!(code == Some(2) && said["problem"].as_str().unwrap().contains("rig.toml"), "{said}");
+    for verb in [&["diagnose"][..], &["report"], &["export", "--to", "csv"]] {
+        let output = muprime().args(verb).arg(&run).output().unwrap();
+        let refused = texts(&output).1.split_whitespace().collect::<Vec<_>>().join(" ");
+        assert!(
+            output.status.code() == Some(2) && refused.contains("repeat the command of the run"),
+            "{refused}"
+        );
+    }
+    let mut again = muprime();
+    again.args(["run", "--setup", "virtual", "--fast", "--out"]).arg(&run).arg(made.at("plan.toml"));
+    assert!(again.output().unwrap().status.success());
+    assert_eq!(std::fs::read(&rig).unwrap(), whole);
+}
+
 /// What the program writes itself is known by what it is, and a part of a run that is damaged by its name.
 #[test]
 fn files_of_the_program_are_known() {

@@ -3,7 +3,7 @@
 use crate::{MuprimeError, refused};
 use calibration::phase::table::read_phases;
 use pyo3::prelude::*;
-use runs::calibrate::{from_files, inverse};
+use tables::calibrate::{from_files, inverse};
 
 /// The certificate of a command line of `muprime calibrate` (words after `calibrate`) as TOML, and its document as JSON.
 #[pyfunction]
@@ -15,10 +15,10 @@ pub fn calibrate(py: Python<'_>, words: Vec<String>) -> PyResult<(String, String
 /// What holds of a certificate's text now, as JSON: its shape, its hash and its time are checked.
 #[pyfunction]
 pub fn certificate(name: &str, text: &str) -> PyResult<String> {
-    runs::calibrate::check(name, text).map_err(refused)?;
+    tables::calibrate::check(name, text).map_err(refused)?;
     let read = calibration::certificate::Certificate::from_toml(text)
         .map_err(|why| MuprimeError::new_err(format!("{name}: {why}")))?;
-    Ok(runs::calibrate::document(&read).to_string())
+    Ok(tables::calibrate::document(&read).to_string())
 }
 
 /// The inverse analysis of a phase table (CSV in memory): `skin` of `muprime calibrate finger --json`.

@@ -5,8 +5,8 @@ mod guided;
 mod live;
 
 use drivers::vibrometer::Settings;
-use runs::calibrate::{Bench, LiveTable, SeriesOptions};
 use runs::setup::Setup;
+use tables::calibrate::{Bench, LiveTable, SeriesOptions};
 
 /// The bench of this machine: instruments are opened, the operator answers at the terminal.
 pub struct AtTheBench;

@@ -265,7 +265,6 @@ pub fn sessions(file: &CampaignFile) -> Vec<Session> {
 
 /// Whether the run in a folder was completed.
 pub fn is_complete(run: &Path) -> bool {
-    let summary = std::fs::read(run.join("summary.json")).ok();
-    let summary = summary.and_then(|bytes| serde_json::from_slice::<crate::session::Summary>(&bytes).ok());
-    summary.is_some_and(|summary| summary.outcome == crate::sequence::Outcome::Complete)
+    crate::session::Summary::written_in(run)
+        .is_some_and(|summary| summary.outcome == crate::sequence::Outcome::Complete)
 }

@@ -1,6 +1,7 @@
 //! Reading files that people wrote: every refusal shows the place in the file and what would do.
 
 use crate::human::rounded;
+use crate::run_dir::{IDENTITY, RUN_AGAIN};
 use miette::{Diagnostic, NamedSource, SourceSpan};
 use models::rig_file::{RigFile, RigFileError};
 use serde::de::DeserializeOwned;
@@ -227,6 +228,9 @@ pub fn bytes_of(path: &Path, most: u64) -> miette::Result<Vec<u8>> {
     let shown = path.display();
     let wrong = |e: std::io::Error| miette::miette!("{shown}: {e}");
     if !path.try_exists().unwrap_or(true) {
+        if path.with_file_name(IDENTITY).is_file() {
+            miette::bail!(help = RUN_AGAIN, "there is no file {shown}");
+        }
         miette::bail!("there is no file {shown}");
     }
     let there = std::fs::metadata(path).map_err(wrong)?;

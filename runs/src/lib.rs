@@ -11,7 +11,6 @@
 //! | [`mod@print`], [`leave`], [`version`] | how the program prints, and ends; the build and its models |
 //! | [`setup`], [`plan`], [`fingertip`] | rigs, plans, fingertips, all checked with the place in the file |
 //! | [`bundled`] | those that come with the program, by name |
-//! | [`calibrate`] | certificates from data; what only instruments give comes through a bench |
 //! | [`campaign`] | one plan with several tips, conditions and days: its sessions in their order |
 //! | [`certificates`], [`model_file`] | a setup's certificates, verified and applied once; a corrected model from its file to the loop |
 //! | [`rehearsal`] | a profile tried before any instrument is |
@@ -39,7 +38,6 @@
 
 pub mod ambient;
 pub mod bundled;
-pub mod calibrate;
 pub mod campaign;
 pub mod catalogue;
 pub mod certificates;

@@ -90,8 +90,7 @@ pub fn read(folder: &Path) -> miette::Result<RunData> {
     damage.extend(differences(folder, &passes)?);
     let rig = rig_file(&folder.join("rig.toml"))?;
     let mu0 = restated(&mut passes, &rig.noise);
-    let summary =
-        std::fs::read(folder.join("summary.json")).ok().and_then(|b| serde_json::from_slice(&b).ok());
+    let summary = Summary::written_in(folder);
     let mut about = about::of_run(folder, &facts, Some(&rig));
     about.extend(mu0.map(|mu0| ("mu_0", format!("{mu0:.4}, of all passes without vibration"))));
     let fidelity = fidelity::read(folder);

@@ -15,7 +15,7 @@ mod events;
 mod passing;
 
 pub use at_rig::Question;
-pub use events::{Event, MeasuredPass, Outcome};
+pub use events::{Event, MeasuredPass, Outcome, Zero, Zeros};
 
 use crate::certificates::temperature::{TemperatureFlag, TemperatureRange};
 use crate::exposure_left::Left;
@@ -366,9 +366,12 @@ impl Sequence {
         if row.now.since(since) < Nanos(ZERO_SETTLE.0 + ZERO_FOR.0) {
             return;
         }
-        let event =
-            Event::Zeros { lateral_n: self.sums.lateral.mean(), normal_n: self.sums.normal.mean(), after };
-        out.events.push(event);
+        out.events.push(Event::Zeros {
+            lateral_n: self.sums.lateral.mean(),
+            normal_n: self.sums.normal.mean(),
+            after,
+            smallest_load_n: self.points.iter().map(|p| p.condition.normal_force_n).reduce(f64::min),
+        });
         self.sums = Sums::default();
         if after {
             if !self.last_steps(row, out) {

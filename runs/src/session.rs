@@ -17,8 +17,8 @@ use crate::fidelity::Stated;
 use crate::fidelity::dynamics::Dynamics;
 use crate::plan::{Plan, Point, Resolution};
 use crate::print::quoted;
-use crate::run_dir::{Identity, RunDir};
-use crate::sequence::{Event, MeasuredPass, Outcome, PAUSE_MAX_S, Sequence};
+use crate::run_dir::{Identity, RunDir, SUMMARY};
+use crate::sequence::{Event, MeasuredPass, Outcome, PAUSE_MAX_S, Sequence, Zeros};
 use crate::setup::{Guards, Setup};
 use crate::supervisor::OffReport;
 use calibration::certificate::sha256_hex;
@@ -159,6 +159,9 @@ pub struct Summary {
     /// `Psi*` of Eq. 20 for the peak-to-peak amplitude; none where the passes give none.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub psi_star: Option<PsiStar>,
+    /// Force zeros of the last session; they are in the readings.
+    #[serde(default)]
+    pub zeros: Zeros,
     /// The loop; `None` in virtual time.
     pub loop_report: Option<LoopReport>,
     /// When the machine did not run ordinary threads; `None` in virtual time.
@@ -189,6 +192,13 @@ pub struct Summary {
     /// What is to be known of the rig's guards.
     #[serde(default)]
     pub guards: Guards,
+}
+
+impl Summary {
+    /// As the last session that ended wrote it in the run's folder; none while one runs.
+    pub fn written_in(folder: &Path) -> Option<Self> {
+        serde_json::from_slice(&std::fs::read(folder.join(SUMMARY)).ok()?).ok()
+    }
 }
 
 /// The finding of a summary that was written before it had one.

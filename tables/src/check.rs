@@ -217,7 +217,7 @@ fn judge_text(kind: &str, name: &str, on: &On, text: &str) -> miette::Result<(Op
             let passes: usize = campaign.setups.iter().map(passes).sum::<miette::Result<_>>()?;
             return Ok((Some(passes * campaign.file.blocks as usize), remarks));
         }
-        "certificate" => runs::calibrate::check(name, text).map(drop)?,
+        "certificate" => crate::calibrate::check(name, text).map(drop)?,
         "defects file" => {
             let defects = sim::defects::Defects::parse(text).map_err(|e| miette::miette!("{e}"))?;
             let config = sim::world::WorldConfig { defects, ..sim::world::WorldConfig::ideal() };

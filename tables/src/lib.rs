@@ -1,4 +1,4 @@
-//! What comes from other programs and goes to them, and the check of any file.
+//! What comes from other programs and goes to them, certificates from series of measurements, and the check of any file.
 //!
 //! | module | purpose |
 //! |---|---|
@@ -7,12 +7,14 @@
 //! | [`joined`] | several runs or tables of one rig as one table |
 //! | [`law`] | a friction law by name or from a file; a law that was tabulated |
 //! | [`passes`] | a point table from its bytes, CSV or Parquet |
+//! | [`calibrate`] | certificates from data; what only instruments give comes through a bench |
 //! | [`schemas`] | schemas from the types, commented beginnings, what is bundled |
 //! | [`verdict`] | the verdict on a table or a run, from its files to those that it is written into |
 //! | [`check`] | what is wrong with any file, and whether a plan can run on a setup |
 
 #![deny(clippy::print_stdout, clippy::print_stderr)]
 
+pub mod calibrate;
 pub mod check;
 pub mod export;
 pub mod import;

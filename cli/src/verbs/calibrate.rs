@@ -3,8 +3,8 @@
 use super::prelude::*;
 use calibration::certificate::{Certificate, ReadError};
 use rig::bench::AtTheBench;
-use runs::calibrate::{Issued, What, certified, verify};
 use runs::human::{number, with_uncertainty};
+use tables::calibrate::{Issued, What, certified, verify};
 
 #[derive(Debug, clap::Args)]
 pub struct Args {

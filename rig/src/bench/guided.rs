@@ -2,12 +2,12 @@
 
 use drivers::Rig;
 use realtime::ports::{Nanos, NoData, Quality};
-use runs::calibrate::SeriesOptions;
 use runs::setup::Setup;
 use runs::{ask, say};
 use std::io::BufRead;
 use std::path::{Path, PathBuf};
 use std::time::{Duration, Instant, SystemTime, UNIX_EPOCH};
+use tables::calibrate::SeriesOptions;
 
 const HELP: &str = "\
 Each line is one reading: what hangs on the sensor now, and which way it changed.

@@ -12,7 +12,6 @@ use crate::rig_lock::RigLock;
 use drive::Drive;
 use drivers::vibrometer::Settings;
 use models::quantity::PeakToPeak;
-use runs::calibrate::{Bench, LiveTable, displacement};
 use runs::session::Unfinished;
 use runs::setup::Setup;
 use runs::{ask, say};
@@ -20,6 +19,7 @@ use std::fmt::Write as _;
 use std::io::{BufRead, Write as _};
 use std::sync::mpsc::{Receiver, RecvTimeoutError, sync_channel};
 use std::time::Duration;
+use tables::calibrate::{Bench, LiveTable, displacement};
 
 /// How often a wait for an answer looks whether the operator has ended it otherwise.
 const POLL_EVERY: Duration = Duration::from_millis(20);

@@ -99,7 +99,7 @@ impl Folder {
 
 /// How a run ended that no process leads.
 fn end_of(folder: &Path) -> Ended {
-    let Some(summary) = summary(folder) else {
+    let Some(summary) = Summary::written_in(folder) else {
         let error = Some("it has no summary: its process ended without one".into());
         let off = Some("nobody has seen whether the drive is off: check the amplifier".into());
         return Ended { error, off, ..Ended::default() };
@@ -107,13 +107,9 @@ fn end_of(folder: &Path) -> Ended {
     Ended::of(&Ok(summary))
 }
 
-fn summary(folder: &Path) -> Option<Summary> {
-    serde_json::from_slice(&std::fs::read(folder.join("summary.json")).ok()?).ok()
-}
-
 fn planned(folder: &Path) -> Option<usize> {
     let begun = run_dir::identity_in(folder).ok().map(|run| run.planned).filter(|planned| *planned > 0);
-    begun.or_else(|| Some(summary(folder)?.planned))
+    begun.or_else(|| Some(Summary::written_in(folder)?.planned))
 }
 
 fn run_of(folder: &Path) -> Option<Run> {

@@ -3,6 +3,7 @@
 use super::html::{columns, escape, table};
 use crate::ambient::AIR;
 use crate::human::number;
+use crate::run_data::about::ZERO_SHARE;
 use crate::sequence::Event;
 use realtime::safety::Cause;
 
@@ -41,14 +42,18 @@ pub fn describe(event: &Event) -> String {
             };
             format!("before arming {what}{why}: nothing was driven; the supply relay is tested again")
         }
-        Event::Zeros { lateral_n, normal_n, after } => {
+        Event::Zeros { lateral_n, normal_n, after, smallest_load_n } => {
             let mn = |v: &Option<f64>| v.map_or("none".into(), |v| format!("{:+.2} mN", v * 1e3));
             let when = if *after { "after" } else { "before" };
-            format!(
-                "force offset {when} the sweep, unloaded: lateral {}, normal {}",
-                mn(lateral_n),
-                mn(normal_n)
-            )
+            let share = normal_n.zip(*smallest_load_n).map(|(zero, load)| zero.abs() / load);
+            let off = match share.filter(|share| *share > ZERO_SHARE) {
+                Some(share) => {
+                    format!("; warning: {:.0} % of the smallest load: zero the sensor", 100.0 * share)
+                }
+                None => String::new(),
+            };
+            let (lateral, normal) = (mn(lateral_n), mn(normal_n));
+            format!("force offset {when} the sweep, unloaded: lateral {lateral}, normal {normal}{off}")
         }
         Event::Tripped(trip) if trip.cause == Cause::Stopped => {
             "stopped on request: drive off, stage at rest, finger lifted".into()

@@ -9,7 +9,7 @@ use crate::ambient::{AIR, LevelsFound, levels_of};
 use crate::human::number;
 use crate::input::unit_of;
 use crate::run_data::{RunData, about};
-use crate::sequence::Outcome;
+use crate::sequence::{Outcome, Zeros};
 use models::condition::Ambient;
 use std::fmt::Write;
 
@@ -77,7 +77,8 @@ fn verdict(w: &mut String, run: &RunData) {
     let psi_star = psi_star.map_or_else(String::new, |found| format!("<br>{}.", escape(&found.to_string())));
     let class = if departed.is_some() { "verdict departed" } else { "verdict" };
     let _ = writeln!(w, "<p class=\"{class}\">{finding}<br>{outcome}{psi_star}</p>");
-    for remark in about::remarks(&run.passes) {
+    let zeros = run.summary.as_ref().map_or_else(Zeros::default, |s| s.zeros);
+    for remark in about::remarks(&run.passes, &zeros) {
         let _ = writeln!(w, "<p class=\"verdict departed\">{}.</p>", escape(&remark));
     }
     if !run.damage.is_empty() {

@@ -36,12 +36,7 @@ fn there(path: &Path) -> miette::Result<()> {
     let shown = path.display();
     match (path.join(POINTS).exists(), path.join(JOURNAL).exists()) {
         (true, true) => Ok(()),
-        (false, true) => miette::bail!(
-            help = format!(
-                "repeat the command of the run with the same --out: it writes the table again from {JOURNAL}"
-            ),
-            "{shown}/{POINTS} is missing"
-        ),
+        (false, true) => miette::bail!(help = super::RUN_AGAIN, "{shown}/{POINTS} is missing"),
         (true, false) => miette::bail!(
             help = format!("take {JOURNAL} from a copy of the folder; the table alone can be diagnosed"),
             "{shown}/{JOURNAL} is missing"

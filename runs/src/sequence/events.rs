@@ -35,6 +35,24 @@ pub struct MeasuredPass {
     pub levels: Vec<Level>,
 }
 
+/// Force zeros of a session, lifted off: the mean of each axis in N, null where the axis sent nothing.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Serialize, Deserialize)]
+pub struct Zeros {
+    /// Before the sweep.
+    pub before: Option<Zero>,
+    /// After it; none where the sweep did not come to its end.
+    pub after: Option<Zero>,
+}
+
+/// One of them.
+#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
+pub struct Zero {
+    /// Lateral.
+    pub lateral_n: Option<f64>,
+    /// Normal.
+    pub normal_n: Option<f64>,
+}
+
 /// Something worth a line in the record and on the terminal.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 #[serde(tag = "event", rename_all = "snake_case")]
@@ -74,6 +92,9 @@ pub enum Event {
         normal_n: Option<f64>,
         /// Before or after the sweep.
         after: bool,
+        /// Smallest load of the plan in N.
+        #[serde(default, skip_serializing_if = "Option::is_none")]
+        smallest_load_n: Option<f64>,
     },
     /// Safety tripped.
     Tripped(Trip),
@@ -334,7 +355,7 @@ mod tests {
             Event::PauseTooLong { bound: 600.0 },
             Event::PauseNotQuiet { cause },
             Event::ArmingDisturbed { cause, held_up: at },
-            Event::Zeros { lateral_n: None, normal_n: Some(0.0), after: true },
+            Event::Zeros { lateral_n: None, normal_n: Some(0.0), after: true, smallest_load_n: Some(0.1) },
             Event::Tripped(trip),
             Event::ModelDeparted { point: 1, log_evidence: 7.0 },
             Event::StopRequested,

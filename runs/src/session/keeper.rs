@@ -7,7 +7,7 @@ use crate::ambient::levels_of;
 use crate::files::Placed;
 use crate::run_data::about::Remarked;
 use crate::run_dir::{RunDir, SUMMARY};
-use crate::sequence::{Event, MeasuredPass, Outcome};
+use crate::sequence::{Event, MeasuredPass, Outcome, Zero, Zeros};
 use crate::setup::Guards;
 use crate::supervisor::OffReport;
 use miette::{IntoDiagnostic, WrapErr};
@@ -65,6 +65,7 @@ pub struct Keeper {
     planned: usize,
     protocol: BTreeMap<String, toml::Value>,
     guards: Guards,
+    zeros: Zeros,
 }
 
 /// The wall clock, in ns since 1970.
@@ -141,9 +142,12 @@ impl Keeper {
         agreement: Agreement,
     ) -> miette::Result<Summary> {
         dir.stay();
-        let written = std::fs::read(dir.path().join(SUMMARY)).ok();
-        let written: Option<Summary> = written.and_then(|text| serde_json::from_slice(&text).ok());
-        if let Some(summary) = written.filter(|s| s.outcome == Outcome::Complete && s.passes == planned) {
+        if !dir.path().join("rig.toml").exists() {
+            dir.write("rig.toml", job.setup.rig_file().to_toml().into_diagnostic()?.as_bytes())?;
+        }
+        if let Some(summary) =
+            Summary::written_in(dir.path()).filter(|s| s.outcome == Outcome::Complete && s.passes == planned)
+        {
             return Ok(Summary { folder: dir.path().to_path_buf(), finished_before: true, ..summary });
         }
         let keeper = Self::of(job, dir, planned).wrap_err(Unfinished::NotKept)?;
@@ -156,7 +160,7 @@ impl Keeper {
     fn of(job: &Job, dir: RunDir, planned: usize) -> miette::Result<Self> {
         dir.write("rig.toml", job.setup.rig_file().to_toml().into_diagnostic()?.as_bytes())?;
         let (passes, protocol, guards) = (dir.made.len(), job.plan.protocol(), job.setup.guards());
-        Ok(Keeper { dir, passes, planned, protocol, guards })
+        Ok(Keeper { dir, passes, planned, protocol, guards, zeros: Zeros::default() })
     }
 
     /// Keeps what a row led to and passes it on. Returns the pass, once it is safe.
@@ -170,7 +174,13 @@ impl Keeper {
         pass: Option<&MeasuredPass>,
         update: &mut dyn FnMut(Update<'_>),
     ) -> miette::Result<()> {
-        events.iter().for_each(|event| update(Update::Event(event)));
+        for event in events {
+            if let Event::Zeros { lateral_n, normal_n, after, .. } = *event {
+                let zero = Zero { lateral_n, normal_n };
+                *(if after { &mut self.zeros.after } else { &mut self.zeros.before }) = Some(zero);
+            }
+            update(Update::Event(event));
+        }
         if let Some(pass) = pass {
             self.dir.keep(pass)?;
             self.passes += 1;
@@ -204,6 +214,7 @@ impl Keeper {
             planned: self.planned,
             model_departed: agreement == Agreement::Departed,
             agreement,
+            zeros: self.zeros,
             loop_report,
             stalls,
             held,

@@ -7,6 +7,9 @@ use crate::schemas::schema::Kind;
 use crate::verdict::unfit;
 use miette::{IntoDiagnostic, WrapErr};
 use runs::input::{MAX_TABLE_BYTES, Problems, bytes_of};
+use runs::run_dir::RUN_AGAIN;
+use runs::sequence::Zeros;
+use runs::session::Summary;
 use std::path::Path;
 
 /// A point table, as a diagnosis would take it; one of conditions has no lateral force.
@@ -73,7 +76,9 @@ pub(super) fn run_folder(path: &Path) -> miette::Result<Good> {
     }
     let mut passes = 0;
     let (mut problems, mut helps) = (Vec::new(), Vec::new());
-    for part in PARTS.iter().map(|part| path.join(part)).filter(|part| part.exists()) {
+    for part in
+        PARTS.iter().map(|part| path.join(part)).filter(|part| part.exists() || part.ends_with("rig.toml"))
+    {
         let name = part.display().to_string();
         match kind_of(&name).and_then(|kind| judge(kind, &name, &On::default(), None)) {
             Ok(good) => passes = good.passes.unwrap_or(passes),
@@ -102,7 +107,8 @@ pub(super) fn run_folder(path: &Path) -> miette::Result<Good> {
     }));
     problems.extend(damage);
     if problems.is_empty() {
-        remarks.extend(runs::run_data::about::remarks(&runs::run_dir::passes_in(path)?));
+        let zeros = Summary::written_in(path).map_or_else(Zeros::default, |summary| summary.zeros);
+        remarks.extend(runs::run_data::about::remarks(&runs::run_dir::passes_in(path)?, &zeros));
         return Ok(Good { kind: "run", passes: Some(passes), remarks });
     }
     let mut printed = std::collections::BTreeSet::new();
@@ -120,10 +126,8 @@ fn is_settled(found: &str, last: &Path) -> bool {
 /// What to do about a part of a run's folder that is damaged.
 fn again(part: &Path) -> &'static str {
     match part.file_name().and_then(|name| name.to_str()) {
-        Some("summary.json" | "points.csv") => {
-            "repeat the command of the run with the same --out: it writes summary.json again, and puts the passes of \
-             passes.jsonl that points.csv lacks back"
-        }
+        Some("summary.json" | "points.csv") => RUN_AGAIN,
+        Some("rig.toml") if !part.exists() => RUN_AGAIN,
         _ => "take the file from a copy of the folder: it was cut or changed after it was written",
     }
 }

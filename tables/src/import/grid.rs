@@ -53,8 +53,8 @@ impl Cell {
     pub fn digits(&self, comma: bool) -> Option<String> {
         match self {
             Cell::Number(v) if v.is_finite() => Some(format!("{v:e}")),
-            Cell::Text(text) if comma && !text.contains('.') => Some(text.replacen(',', ".", 1)),
-            Cell::Text(text) if !comma => Some(text.clone()),
+            Cell::Text(text) if comma && !text.contains('.') => Some(exponent(&text.replacen(',', ".", 1))),
+            Cell::Text(text) if !comma => Some(exponent(text)),
             _ => None,
         }
     }
@@ -75,6 +75,18 @@ impl Cell {
     pub fn is_number(&self, comma: bool) -> bool {
         let written = || self.digits(comma).is_some_and(|d| Unit::SI.apply(&d).is_some());
         written() || self.ratio(comma).is_some() || super::clock::is_time(self)
+    }
+}
+
+/// A number with its exponent as Fortran prints it, `3.0D+00`, with the common `e`.
+pub fn exponent(text: &str) -> String {
+    let signed = |at: &usize| {
+        text[at + 1..].starts_with(['+', '-'])
+            && text[..*at].ends_with(|c: char| c.is_ascii_digit() || c == '.')
+    };
+    match text.find(['D', 'd']).filter(signed) {
+        Some(at) => format!("{}e{}", &text[..at], &text[at + 1..]),
+        None => text.to_string(),
     }
 }
 

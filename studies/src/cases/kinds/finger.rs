@@ -5,10 +5,10 @@ use crate::cases::file::Header;
 use calibration::certificate::sha256_hex;
 use calibration::phase::table::read_phases;
 use miette::Context;
-use runs::calibrate::inverse::{self, Options};
 use runs::input::{MAX_TABLE_BYTES, bytes_of};
 use serde::{Deserialize, Serialize};
 use std::path::{Path, PathBuf};
+use tables::calibrate::inverse::{self, Options};
 
 /// The kind.
 pub const KIND: CaseKind = CaseKind {

@@ -3,7 +3,7 @@
 use super::Marks;
 use crate::import::apart;
 use crate::import::clock::is_time;
-use crate::import::grid::{Cell, Row, middle};
+use crate::import::grid::{Cell, Row, exponent, middle};
 use crate::import::head::NO_ROWS_HELP;
 use instruments::units::Unit;
 use miette::IntoDiagnostic;
@@ -161,7 +161,7 @@ fn commas_are_decimal(lines: &[(u64, &str)]) -> bool {
 
 /// Whether a cell is a number with either mark. A comma in a cell that commas separate was in quotes.
 pub fn is_number(cell: &str) -> bool {
-    Unit::SI.apply(&cell.trim().replacen(',', ".", 1)).is_some()
+    Unit::SI.apply(&exponent(&cell.trim().replacen(',', ".", 1))).is_some()
 }
 
 /// The usual number of cells of a line, and the lines as cells.

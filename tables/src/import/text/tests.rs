@@ -23,6 +23,7 @@ fn delimiter_and_decimal_mark_are_found() {
         "Operator: A. Nonym\nDate;1.5.2024\n\"a\";\"b\"\n1,5;2\n-3;0,4\n",
         "# measured, with care\n# a b\n1.5 2\n-3 0.4\n",
         "a|b\n[um]|[N]\n1.5|2\n-3|0.4\n",
+        "a b\n1.5D+00 2.0D+00\n-3.0D+00 4.0d-01\n",
     ] {
         let found = grid(text);
         assert_eq!(found.header, ["a", "b"], "{text}");

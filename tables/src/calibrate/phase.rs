@@ -2,13 +2,13 @@
 
 use super::tables::{Sources, columns};
 use super::{Bench, Common, Issued};
-use crate::say;
-use crate::setup::Setup;
 use calibration::amplitude::vibrometer::{Decoder, amplitude};
 use calibration::phase::{
     Acquisition, PhasePoint, RepeatedShift, Shift, Waveforms, outcome, repeated, shift, write_phases,
 };
 use models::quantity::PeakToPeak;
+use runs::say;
+use runs::setup::Setup;
 use std::path::PathBuf;
 
 /// Arguments.
@@ -113,7 +113,7 @@ pub fn certified(args: &Args, bench: &dyn Bench) -> miette::Result<Issued> {
     }
     let mut table = Vec::new();
     write_phases(&mut table, &points).map_err(|e| miette::miette!("{e}"))?;
-    crate::files::write_whole(&args.phases, &table)?;
+    runs::files::write_whole(&args.phases, &table)?;
     say!("{} amplitudes: {}", points.len(), args.phases.display());
     let acquisition = Acquisition {
         frequency_hz: args.frequency_hz,

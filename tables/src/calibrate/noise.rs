@@ -126,7 +126,7 @@ pub fn certified(args: &Args) -> miette::Result<Issued> {
         for (k, (l, n)) in spectra[0].density.iter().zip(&spectra[1].density).enumerate().skip(1) {
             let _ = writeln!(text, "{},{l:e},{n:e}", k as f64 * spectra[0].resolution_hz);
         }
-        crate::files::write_output(path, text)?;
+        runs::files::write_output(path, text)?;
     }
     let sd =
         findings.iter().filter(|f| f.name.ends_with("noise_sd")).map(|f| f.estimate[0]).fold(0.0, f64::max);

@@ -2,7 +2,6 @@
 //! first over the whole range of moduli as elastic skin, then about what was found with penalty and
 //! retardation time free as well.
 
-use crate::say;
 use calibration::identify::skin::{IdentifiedSkin, identify_skin};
 use calibration::identify::{Identified, Search, identify};
 use calibration::phase::table::PhasePoint;
@@ -10,6 +9,7 @@ use indicatif::{ProgressBar, ProgressDrawTarget, ProgressStyle};
 use miette::IntoDiagnostic;
 use models::quantity::PeakToPeak;
 use models::ridge::{PhaseCurves, RidgeCase, Skin, SkinGrid};
+use runs::say;
 
 /// Standard error in degrees that the default mesh leaves in a computed phase (`docs/ridge.md`).
 const MODEL_SD_DEG: f64 = 2.0;

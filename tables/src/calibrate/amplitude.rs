@@ -2,14 +2,14 @@
 
 use super::tables::{Sources, columns};
 use super::{Bench, Common, Issued, LiveTable, displacement};
-use crate::say;
-use crate::setup::Setup;
 use calibration::amplitude::apply::AmplitudeFit;
 use calibration::amplitude::droop::{Exponent, droop};
 use calibration::amplitude::gain::{Form, fit};
 use calibration::amplitude::map::mode_shape;
 use calibration::amplitude::resonance::sweep;
 use calibration::amplitude::{AmplitudeError, AmplitudePoint};
+use runs::say;
+use runs::setup::Setup;
 use std::path::{Path, PathBuf};
 
 /// Arguments.
@@ -168,7 +168,7 @@ fn live_table(args: &Args, bench: &dyn Bench) -> miette::Result<(PathBuf, String
     let table = LiveTable { set_points_pp_m: live, frequency_hz, passes, settle_s };
     let text = bench.amplitudes(&setup, &table)?;
     let path = args.common.out.clone().unwrap_or_else(|| "amplitude.toml".into()).with_extension("csv");
-    crate::files::write_whole(&path, &text)?;
+    runs::files::write_whole(&path, &text)?;
     say!("the table is in {}", path.display());
     let settings = text.lines().next().and_then(|l| l.strip_prefix("# vibrometer: ")).unwrap_or_default();
     Ok((path, settings.to_string()))

@@ -2,9 +2,9 @@
 
 use super::tables::{Sources, with_columns};
 use super::{Bench, Common, Issued, SeriesOptions};
-use crate::say;
 use calibration::force::matrix::{Linearity, Options, fit};
 use calibration::force::series::{self, Weighing};
+use runs::say;
 use std::path::PathBuf;
 
 /// Arguments.

@@ -15,7 +15,6 @@ mod noise;
 mod phase;
 mod tables;
 
-use crate::setup::Setup;
 use calibration::certificate::{
     Certificate, CertificateKind, Circumstances, Instrument, Occasion, Outcome, Parameter, RawData, Verified,
     date,
@@ -23,6 +22,7 @@ use calibration::certificate::{
 use drivers::vibrometer::Settings;
 use miette::IntoDiagnostic;
 use models::quantity::PeakToPeak;
+use runs::setup::Setup;
 use serde_json::json;
 use std::path::{Path, PathBuf};
 use std::time::{SystemTime, UNIX_EPOCH};

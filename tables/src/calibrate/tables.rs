@@ -1,8 +1,8 @@
 //! Small CSV tables by column name, with the line of whatever cannot be read or cannot be.
 
-use crate::input;
 use calibration::certificate::RawData;
 use realtime::safety::HARD;
+use runs::input;
 use std::collections::HashMap;
 use std::path::Path;
 
