@@ -279,8 +279,8 @@ fn damaged_records_are_refused_and_whole_ones_are_known() {
     }
 }
 
-/// The folder of a run whose rig.toml is gone was OK, three verbs refused it without a word on what to do, and the
-/// command of the run left it as it was.
+/// The folder of a run whose rig.toml is gone was OK, three verbs refused it without a remedy, and
+/// the command of the run left it as it was.
 #[test]
 fn a_rig_file_that_is_gone_is_told_and_the_command_of_the_run_writes_it_again() {
     let made = Made::new();

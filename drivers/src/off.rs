@@ -9,6 +9,7 @@ pub use super::ended::OFF_WITHIN;
 use super::mailbox::Mailbox;
 use super::ports::SetPoint;
 use super::session::Session;
+use realtime::clock::Clock;
 use realtime::ports::Nanos;
 use std::sync::Arc;
 use std::sync::atomic::{AtomicBool, Ordering};
@@ -24,18 +25,22 @@ pub(crate) const LOOK_EVERY: Duration = Duration::from_millis(10);
 /// Pause between two tries.
 const AGAIN: Duration = Duration::from_millis(4);
 
-/// Whether an 'off' is pending for an instrument that drives or moves: it shortens the wait for an answer.
+/// Whether an 'off' is pending for an instrument that drives or moves, or due because its command has
+/// expired: that shortens the wait for an answer.
 #[derive(Clone, Default)]
 pub struct PendingOff {
     pub(crate) commands: Mailbox<SetPoint>,
     pub(crate) stop: Arc<AtomicBool>,
+    /// By which a command expires.
+    pub(crate) clock: Option<Clock>,
 }
 
 impl PendingOff {
     /// How long the answer may take, in ms, of the `answer_ms` that it may take otherwise.
     pub fn limit_ms(&self, answer_ms: u32) -> u32 {
-        let off_waits = || self.commands.off_waits() || self.stop.load(Ordering::Acquire);
-        if self.commands.drives() && off_waits() { answer_ms.min(OFF_WAITS_MS) } else { answer_ms }
+        let expired = || self.clock.as_ref().is_some_and(|clock| self.commands.expired(clock.now()));
+        let is_due = || self.commands.off_waits() || self.stop.load(Ordering::Acquire) || expired();
+        if self.commands.drives() && is_due() { answer_ms.min(OFF_WAITS_MS) } else { answer_ms }
     }
 
     /// When to check again. A pending 'off' brings `deadline` nearer.

@@ -143,7 +143,7 @@ impl<S> Port<S> {
     /// Hands a set-point to the link.
     pub(crate) fn push(&mut self, set_point: impl Into<SetPoint>) {
         let set_point = set_point.into();
-        self.commands.put(set_point, !set_point.on);
+        self.commands.put(set_point, set_point.on.then_some(set_point.expires_at));
     }
 }
 

@@ -76,15 +76,9 @@ impl Session {
         stop: Arc<AtomicBool>,
         ready: SyncSender<Result<(), Ended>>,
     ) -> Self {
-        let pending_off = endpoint.pending_off(&stop);
-        Self {
-            endpoint,
-            clock: clock.into().join(SLACK),
-            stop,
-            pending_off,
-            ready: Some(ready),
-            off_by: None,
-        }
+        let clock = clock.into();
+        let pending_off = endpoint.pending_off(&stop, &clock);
+        Self { endpoint, clock: clock.join(SLACK), stop, pending_off, ready: Some(ready), off_by: None }
     }
 
     /// Whether no connection has given a sample yet: nothing was commanded then, and nothing may be.

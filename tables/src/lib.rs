@@ -1,4 +1,4 @@
-//! What comes from other programs and goes to them, certificates from series of measurements, and the check of any file.
+//! What comes from other programs and goes to them, certificates from series, and the check of any file.
 //!
 //! | module | purpose |
 //! |---|---|

@@ -10,6 +10,7 @@ use crate::mailbox::Mailbox;
 use crate::off::PendingOff;
 use crate::ports::SetPoint;
 use instruments::{Profile, SetId};
+use realtime::clock::Clock;
 use realtime::ports::{Nanos, NoData};
 use ringbuf::traits::Producer;
 use std::sync::Arc;
@@ -204,9 +205,10 @@ impl Endpoint {
         }
     }
 
-    /// Whether an 'off' is pending, or `stop` was set.
-    pub(crate) fn pending_off(&self, stop: &Arc<AtomicBool>) -> PendingOff {
-        PendingOff { commands: self.orders.commands.clone(), stop: Arc::clone(stop) }
+    /// Whether an 'off' is pending, `stop` was set, or what drives has expired.
+    pub(crate) fn pending_off(&self, stop: &Arc<AtomicBool>, clock: &Clock) -> PendingOff {
+        let (commands, stop) = (self.orders.commands.clone(), Arc::clone(stop));
+        PendingOff { commands, stop, clock: Some(clock.clone()) }
     }
 
     /// What the instrument is to the rig.

@@ -164,18 +164,20 @@ fn a_new_connection_begins_with_off() {
     drop(port);
 }
 
-/// An amplifier takes its set-points and answers no question: 'off' waited as long as an answer may take.
+/// An amplifier takes its set-points and answers no question: 'off' waited as long as an answer may take. So
+/// did the 'off' that is due because the loop's command has expired.
 #[test]
 fn an_off_waits_for_no_answer_that_stays_away() {
-    for by_stop in [false, true] {
+    for by in ["stop", "off", "expiry"] {
         let (address, ways, requests) = instrument();
         let (thread, stop, mut port) = driving(&address, &requests);
         ways.silent.store(true, Ordering::SeqCst);
         while requests.recv_timeout(PATIENCE).unwrap() != Frame::Unanswered {}
         ways.silent.store(false, Ordering::SeqCst);
-        match by_stop {
-            true => stop.store(true, Ordering::Release),
-            false => port.push(DriveSetPoint { enable: false, ..on(2, u64::MAX) }),
+        match by {
+            "stop" => stop.store(true, Ordering::Release),
+            "expiry" => port.push(on(2, 0)),
+            _ => port.push(DriveSetPoint { enable: false, ..on(2, u64::MAX) }),
         }
         let first = requests.recv_timeout(PATIENCE).expect("'off' waits for the answer");
         assert!(matches!(&first, Frame::Write(2, 100, registers) if registers[3] == 0), "{first:?}");

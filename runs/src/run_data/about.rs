@@ -51,8 +51,8 @@ pub fn remarks(passes: &[MeasuredPass], zeros: &Zeros) -> Vec<String> {
 /// Share of the smallest force of an axis from which a zero, or its way in the run, is remarked.
 pub const ZERO_SHARE: f64 = 0.05;
 
-/// The remarks on zeros that are off, or that moved. The smallest force is the smallest commanded load, and the
-/// smallest lateral force of a pass without vibration.
+/// The remarks on zeros that are off, or that moved. The smallest force is the smallest commanded load, and
+/// the smallest lateral force of a pass without vibration.
 fn zeros_off(passes: &[MeasuredPass], zeros: &Zeros) -> Vec<String> {
     let still = passes.iter().filter(|p| p.pass.amplitude == PeakToPeak::ZERO);
     let friction = still.filter_map(|p| p.pass.lateral_force_n).map(f64::abs).reduce(f64::min);

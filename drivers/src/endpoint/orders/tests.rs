@@ -19,7 +19,7 @@ fn supply() -> (Endpoint, SupplyPort) {
 /// The loop's command to a stage. Only the loop can make one that moves, so it is put where the loop's port would put it.
 fn ask(endpoint: &Endpoint, velocity_m_s: f64, normal_force_n: f64) {
     let command = SetPoint::of_stage(velocity_m_s, normal_force_n, 3, Nanos(100));
-    endpoint.orders.commands.put(command, !command.on);
+    endpoint.orders.commands.put(command, command.on.then_some(command.expires_at));
 }
 
 fn show_closed(endpoint: &mut Endpoint, closed: bool, arrived: u64) {
