@@ -41,8 +41,7 @@ def plan_parse(name: str, text: str) -> tuple[str, str, str]: ...
 def plan_made(document: str) -> tuple[str, str, str]: ...
 def plan_passes(name: str, text: str, setup: str, seed: int | None) -> str: ...
 def diagnose(
-    name: str,
-    table: bytes,
+    tables: list[tuple[str, bytes, str | None]],
     rig_name: str,
     rig: str,
     pairs: bool,
@@ -50,7 +49,6 @@ def diagnose(
     predict: bytes | None,
     damage: list[str],
     model: tuple[str, str | None] | None,
-    run: str | None,
     effects: list[str],
 ) -> tuple[str, str, str, str | None, str | None]: ...
 def law_grid(name: str, table: bytes, variables: list[str]) -> list[tuple[str, list[float]]]: ...

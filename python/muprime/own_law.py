@@ -83,11 +83,13 @@ Model = str | os.PathLike[str] | LawTable | Callable[..., Any]
 """What leads a diagnosis: a built-in law's name, a file, a tabulated law, or a function as :func:`tabulate` takes it."""
 
 
-def base_law(model: Model, name: str, table: bytes) -> tuple[str, str | None]:
+def base_law(model: Model, tables: list[tuple[str, bytes, str | None]]) -> tuple[str, str | None]:
     """A base law as the crates take it: its name or path, and its text where it is not a file."""
     if isinstance(model, (str, os.PathLike)):
         return os.fspath(model), None
     if not isinstance(model, LawTable):
+        if len(tables) > 1:
+            raise _muprime.MuprimeError("a function takes its ranges from one table: tabulate it first (tabulate)")
         variables = list(inspect.signature(model).parameters)
-        model = tabulate(model, dict(_muprime.law_grid(name, table, variables)))
+        model = tabulate(model, dict(_muprime.law_grid(*tables[0][:2], variables)))
     return model.name, model.text

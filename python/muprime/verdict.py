@@ -88,6 +88,19 @@ def _interval(ends: list[float] | None) -> tuple[float, float] | None:
     return (ends[0], ends[1]) if ends else None
 
 
+def _part(table: Any, damage: list[str]) -> tuple[str, bytes, str | None, Path | None]:
+    """A table's name and bytes, its run's folder, the rig.toml beside it; what is damaged in the folder is added."""
+    if isinstance(table, Run):
+        table = table.folder
+    if not isinstance(table, (str, os.PathLike)):
+        return "the data frame", csv_bytes(table), None, None
+    path = Path(table)
+    if path.is_dir():
+        damage += load(path).damage
+        return os.fspath(path / "points.csv"), (path / "points.csv").read_bytes(), os.fspath(path), path / "rig.toml"
+    return os.fspath(path), path.read_bytes(), None, path.parent / "rig.toml"
+
+
 def diagnose(
     table: Any,
     rig: str | os.PathLike[str] | None = None,
@@ -98,10 +111,10 @@ def diagnose(
     model: Model | None = None,
     effects: list[str | os.PathLike[str]] | tuple[str | os.PathLike[str], ...] = (),
 ) -> Verdict:
-    """Diagnoses a table of passes.
+    """Diagnoses a table of passes, or several of one rig in one state together.
 
-    ``table``: a point table's path (CSV or Parquet), a run (its folder or a :class:`Run`), or a data frame with the columns of a point
-    table. ``rig``: path of the rig.toml that states what is calibrated; by default the one beside the table. ``pairs=False`` tries
+    ``table``: a point table's path (CSV or Parquet), a run (its folder or a :class:`Run`), a data frame with the columns of a point
+    table, or a list of these: a run and the further passes that its verdict asked for count as one table. ``rig``: path of the rig.toml that states what is calibrated; by default the one beside the table. ``pairs=False`` tries
     single effects only, ``without`` leaves effects out. ``predict``: conditions, a path or a data frame. ``model``: the base law in place of the
     spring-slider: ``'psi'``, ``'surrogate'``, a file, a :class:`LawTable`, or a function as :func:`tabulate` takes it. A function is
     tabulated over the ranges of the table, for the variables that its arguments name. ``effects``: tables of candidate effects of your
@@ -110,27 +123,28 @@ def diagnose(
     Bad input is a :class:`MuprimeError` with the row and the remedy.
     """
     damage: list[str] = []
-    run: str | None = None
-    if isinstance(table, Run):
-        table = table.folder
-    if isinstance(table, (str, os.PathLike)):
-        path = Path(table)
-        if path.is_dir():
-            damage, run = load(path).damage, os.fspath(path)
-            rig = rig or path / "rig.toml"
-            path = path / "points.csv"
-        rig = rig or path.parent / "rig.toml"
-        name, data = os.fspath(path), path.read_bytes()
-    else:
-        name, data = "the data frame", csv_bytes(table)
-        if rig is None:
+    tables: list[tuple[str, bytes, str | None]] = []
+    rigs: list[Path] = [] if rig is None else [Path(rig)]
+    for one in table if isinstance(table, (list, tuple)) else [table]:
+        name, data, run, beside = _part(one, damage)
+        if rig is None and beside is None:
             raise _muprime.MuprimeError("a data frame has no rig.toml beside it: name one with rig=")
+        rigs += [beside] if rig is None and beside is not None else []
+        tables.append((name, data, run))
+    if not tables:
+        raise _muprime.MuprimeError("the list of tables is empty")
+    stated = [path.read_text(encoding="utf-8") for path in rigs]
+    for path, text in zip(rigs, stated):
+        if text != stated[0]:
+            raise _muprime.MuprimeError(
+                f"{rigs[0]} and {path} differ: tables that are diagnosed together are of one rig in one state; "
+                "rig= names the file that holds for all"
+            )
     if predict is not None:
         predict = Path(predict).read_bytes() if isinstance(predict, (str, os.PathLike)) else csv_bytes(predict)
-    law = None if model is None else base_law(model, name, data)
-    rig = Path(rig)
+    law = None if model is None else base_law(model, tables)
     text, words, page, predictions, corrected = _muprime.diagnose(
-        name, data, os.fspath(rig), rig.read_text(encoding="utf-8"), pairs, list(without), predict, damage, law, run,
+        tables, os.fspath(rigs[0]), stated[0], pairs, list(without), predict, damage, law,
         [os.fspath(effect) for effect in effects],
     )
     told = json.loads(text)

@@ -8,8 +8,9 @@ use miette::{Context, IntoDiagnostic};
 use models::pass::read_passes;
 use pyo3::prelude::*;
 use runs::verdict::{corrected_model, words};
-use std::path::Path;
-use tables::law::{for_finger, of_text};
+use std::path::{Path, PathBuf};
+use tables::joined::{Part, joined, start_of};
+use tables::law::{for_finger, of_text, own_effects};
 use tables::passes::parse_passes;
 use tables::verdict::Subject;
 
@@ -20,15 +21,17 @@ type Texts = (String, String, String, Option<String>, Option<String>);
 /// A base law: its name or path, and its text where it is not a file.
 type Model = (String, Option<String>);
 
-/// Diagnoses a point table in memory (`name` is how messages call it) under a rig.toml in memory; the
-/// record in the folder `run` is read too.
+/// A point table in memory: how messages call it, its bytes, and the folder of its run.
+type InMemory = (String, Vec<u8>, Option<PathBuf>);
+
+/// Diagnoses point tables in memory, several as one, under a rig.toml in memory; the record of a single run
+/// is read too.
 #[pyfunction]
-#[pyo3(signature = (name, table, rig_name, rig, pairs, without, predict, damage, model, run, effects))]
+#[pyo3(signature = (tables, rig_name, rig, pairs, without, predict, damage, model, effects))]
 #[allow(clippy::too_many_arguments)]
 pub fn diagnose(
     py: Python<'_>,
-    name: &str,
-    table: Vec<u8>,
+    tables: Vec<InMemory>,
     rig_name: &str,
     rig: &str,
     pairs: bool,
@@ -36,35 +39,40 @@ pub fn diagnose(
     predict: Option<Vec<u8>>,
     damage: Vec<String>,
     model: Option<Model>,
-    run: Option<std::path::PathBuf>,
-    effects: Vec<std::path::PathBuf>,
+    effects: Vec<PathBuf>,
 ) -> PyResult<Texts> {
     if let Some(unknown) = without.iter().find(|name| ::effects::by_name(name).is_none()) {
         return Err(MuprimeError::new_err(format!("without {unknown:?}: no such effect")));
     }
     py.detach(|| {
-        let own = tables::law::own_effects(&effects)?;
+        let own = own_effects(&effects)?;
         let choice = Options { pairs, without, own, ..Options::default() };
-        texts(name, &table, rig_name, rig, choice, predict, &damage, model, run.as_deref())
+        texts(tables, rig_name, rig, choice, predict, &damage, model)
     })
     .map_err(refused)
 }
 
-#[allow(clippy::too_many_arguments)]
 fn texts(
-    name: &str,
-    bytes: &[u8],
+    tables: Vec<InMemory>,
     rig_name: &str,
     rig: &str,
     choice: Options,
     predict: Option<Vec<u8>>,
     damage: &[String],
     model: Option<Model>,
-    run: Option<&Path>,
 ) -> miette::Result<Texts> {
     let rig = runs::input::rig_text(rig_name, rig)?;
-    let passes = parse_passes(Path::new(name), bytes)?;
-    let mut subject = Subject::of(passes, bytes, rig).into_diagnostic().wrap_err_with(|| name.to_string())?;
+    let shown = tables.iter().map(|(name, ..)| name.as_str()).collect::<Vec<_>>().join(", ");
+    let run = tables.first().filter(|_| tables.len() == 1).and_then(|(_, _, run)| run.clone());
+    let (mut parts, mut all) = (Vec::new(), Vec::new());
+    for (name, bytes, run) in tables {
+        let passes = parse_passes(Path::new(&name), &bytes)?;
+        let start_unix_s = run.as_ref().and_then(|run| start_of(run));
+        parts.push(Part { name: run.map_or(name, |run| run.display().to_string()), passes, start_unix_s });
+        all.extend(bytes);
+    }
+    let mut subject =
+        Subject::of(joined(parts)?, &all, rig).into_diagnostic().wrap_err_with(|| shown.clone())?;
     if let Some((what, text)) = model {
         let base = match text {
             Some(text) => of_text(&what, what.clone(), text, &subject.rig.finger)?,
@@ -78,8 +86,8 @@ fn texts(
         Table::conditions(&rows, &origin).into_diagnostic()
     });
     let conditions = conditions.transpose().wrap_err("conditions to predict")?;
-    let result = subject.diagnose(choice, run)?;
-    let page = subject.page_of_table(&result, name, rig_name)?;
+    let result = subject.diagnose(choice, run.as_deref())?;
+    let page = subject.page_of_table(&result, &shown, rig_name)?;
     let predicted = conditions.as_ref().map(|conditions| predictions(&result, conditions)).transpose();
     let predicted = predicted.into_diagnostic().wrap_err("conditions to predict")?;
     let (model, rig) = (corrected_model(&result)?, &subject.rig);

@@ -25,9 +25,18 @@ pub fn start_of(run: &Path) -> Option<f64> {
 /// record says, at the earliest when the one before it ends: virtual runs and tables follow without a pause.
 /// Points are numbered on: those of the second part by the next power of ten (pass 7 is 107 or 1007). One
 /// part stays as it is.
-pub fn joined(mut parts: Vec<Part>) -> Vec<Pass> {
+///
+/// # Errors
+/// The same passes twice.
+pub fn joined(mut parts: Vec<Part>) -> miette::Result<Vec<Pass>> {
     if parts.len() == 1 {
-        return parts.remove(0).passes;
+        return Ok(parts.remove(0).passes);
+    }
+    for (k, part) in parts.iter().enumerate() {
+        if let Some(same) = parts[..k].iter().find(|before| before.passes == part.passes) {
+            let (name, same) = (&part.name, &same.name);
+            miette::bail!(help = "give each run once", "{name} holds the same passes as {same}");
+        }
     }
     if parts.iter().all(|p| p.start_unix_s.is_some()) {
         parts.sort_by(|a, b| a.start_unix_s.unwrap_or(0.0).total_cmp(&b.start_unix_s.unwrap_or(0.0)));
@@ -49,7 +58,7 @@ pub fn joined(mut parts: Vec<Part>) -> Vec<Pass> {
             ..p
         }));
     }
-    all
+    Ok(all)
 }
 
 #[cfg(test)]
@@ -63,7 +72,7 @@ mod tests {
     }
 
     fn seen(parts: Vec<Part>) -> Vec<(String, u64, f64)> {
-        joined(parts).into_iter().map(|p| (p.run.unwrap_or_default(), p.point, p.time_s)).collect()
+        joined(parts).unwrap().into_iter().map(|p| (p.run.unwrap_or_default(), p.point, p.time_s)).collect()
     }
 
     #[test]
@@ -96,6 +105,6 @@ mod tests {
     fn one_table_stays_as_it_is() {
         let alone = part("a", None, [1.0, 2.0]);
         let before = alone.passes.clone();
-        assert_eq!(joined(vec![alone]), before);
+        assert_eq!(joined(vec![alone]).unwrap(), before);
     }
 }

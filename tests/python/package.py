@@ -105,6 +105,15 @@ for frame in (points, points.to_pandas(), polars.from_arrow(points)):
     assert again.text == verdict.text and [h.probability for h in again.hypotheses] == [h.probability for h in verdict.hypotheses]
     assert again.predictions is not None and again.predictions.count("\n") == 6
 
+# Several runs count as one table, byte for byte as the command has it.
+other = muprime.run("first-sweep", out=FOLDER / "other", setup="virtual", seed=8)
+joined = muprime.diagnose([run, other.folder], pairs=False)
+assert joined.json + "\n" == told("diagnose", str(FOLDER / "here"), str(FOLDER / "other"), "--no-pairs", "--json")
+refusal(lambda: muprime.diagnose([run, FOLDER / "there"]), "same passes")
+(FOLDER / "other/rig.toml").write_text((FOLDER / "other/rig.toml").read_text().replace("pass_relative_sd = 0.", "pass_relative_sd = 0.1"))
+refusal(lambda: muprime.diagnose([run, other]), "differ", "rig=")
+refusal(lambda: muprime.diagnose([]), "empty")
+
 # Laws: against the command, against Eq. 20 in NumPy, and on a million conditions beside it.
 w = np.geomspace(0.3e-6, 5e-6, 7)
 for name, law in (("spring-slider", muprime.spring_slider), ("psi", muprime.psi), ("surrogate", muprime.surrogate)):

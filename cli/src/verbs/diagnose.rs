@@ -165,15 +165,12 @@ fn read(inputs: &Inputs<'_>, args: &Args) -> miette::Result<(Subject, Vec<String
     let rig = runs::input::rig_file(&inputs.rig)
         .map_err(|why| refusal(why, &named, "rig.toml"))
         .wrap_err_with(|| format!("{named}: noise and stiffnesses of the rig (--rig names the file)"))?;
-    let (mut parts, mut damage, mut all, mut rendered) = (Vec::<Part>::new(), Vec::new(), Vec::new(), false);
+    let (mut parts, mut damage, mut all, mut rendered) = (Vec::new(), Vec::new(), Vec::new(), false);
     for (data, table) in args.data.iter().zip(&inputs.tables) {
         let bytes = bytes_of(table, MAX_TABLE_BYTES)
             .wrap_err_with(|| format!("cannot read the table {}", table.display()))?;
         let passes = parse_passes(table, &bytes).map_err(|why| refused(why, table))?;
         let name = data.display().to_string();
-        if let Some(same) = parts.iter().find(|part| part.passes == passes) {
-            miette::bail!(help = "give each run once", "{name} holds the same passes as {}", same.name);
-        }
         if data.is_dir() {
             damage.extend(runs::run_dir::damage_in(data)?);
             rendered |= data.join(runs::fidelity::FILE).is_file();
@@ -181,7 +178,7 @@ fn read(inputs: &Inputs<'_>, args: &Args) -> miette::Result<(Subject, Vec<String
         parts.push(Part { name, passes, start_unix_s: start_of(data) });
         all.extend(bytes);
     }
-    let whole = Subject::of(joined(parts), &all, rig).map_err(|why| {
+    let whole = Subject::of(joined(parts)?, &all, rig).map_err(|why| {
         let help = "passes that render have no steady friction: diagnose a sweep of the same rig, and give its \
                     corrected model to the rendering";
         match (rendered, &inputs.tables[..]) {
