@@ -163,11 +163,12 @@ fn the_last_of_a_wait_is_spun_where_that_is_asked() {
         assert!(monotonic_ns() >= until);
         thread_ns() - before
     };
-    // A busy machine may leave few of the 60 ms to this thread: the best of some tries.
+    // A busy machine leaves a few of the 60 ms to this thread (9.3 ms were the best of 20 tries at a load of 9);
+    // a sleep takes some tens of microseconds.
     let spun = (0..20).map(|_| spent(Duration::from_millis(50))).max().unwrap();
     let slept = (0..20).map(|_| spent(Duration::ZERO)).min().unwrap();
-    assert!(spun > 10_000_000 && spun < 58_000_000, "{spun}");
-    assert!(slept < 5_000_000, "{slept}");
+    assert!(spun > 1_500_000 && spun < 58_000_000, "{spun}");
+    assert!(slept < 1_000_000, "{slept}");
     // More than there is time for: nothing is slept.
     wait_until(monotonic_ns() + 1000, u64::MAX);
 }
