@@ -26,6 +26,7 @@ use runs::setup::Setup;
 use serde_json::json;
 use std::path::{Path, PathBuf};
 use std::time::{SystemTime, UNIX_EPOCH};
+use tables::{Sources, columns, with_columns};
 
 /// What only instruments at a bench can give; without a bench whatever would open one is refused.
 ///
@@ -93,23 +94,32 @@ pub enum What {
     /// Dead weights to the force sensor's matrix; without a series, guided at the terminal
     Force(force::Args),
     /// A vibrometer's tables to the plate's amplitude
-    Amplitude(amplitude::Args),
+    Amplitude(Of<amplitude::Args>),
     /// Edges and time stamps to delays, jitter and clock drift
-    Latency(latency::Args),
+    Latency(Of<latency::Args>),
     /// Vibrometer waveforms of plate and skin to the contact phase shift (Eq. 1)
-    Phase(phase::Args),
+    Phase(Of<phase::Args>),
     /// Stiffness, friction and (from a phase table) modulus, penalty and retardation time of a fingertip
-    Finger(finger::Args),
+    Finger(Of<finger::Args>),
     /// Creep of a force channel under a standing load
-    Creep(creep::Args),
+    Creep(Of<creep::Args>),
     /// Direction of the force sensor's axes, by gravity at known tilts
-    Gravity(gravity::Args),
+    Gravity(Of<gravity::Args>),
     /// Spectrum, quantisation and frozen-value rule of the force sensor at rest
-    Noise(noise::Args),
+    Noise(Of<noise::Args>),
     /// Bandwidth and dead time of a channel from steps of force
-    Step(dynamics::Args),
+    Step(Of<dynamics::Args>),
     /// Resonance of the sensor's mount from taps
-    Tap(dynamics::Args),
+    Tap(Of<dynamics::Args>),
+}
+
+/// The options of one calibration, then those of all.
+#[derive(Debug, clap::Args)]
+pub struct Of<T: clap::Args> {
+    #[command(flatten)]
+    args: T,
+    #[command(flatten)]
+    common: Common,
 }
 
 /// What every calibration asks of its operator.
@@ -144,18 +154,20 @@ pub struct Common {
 /// # Errors
 /// Data that is unfit for a certificate, with the reason; files that cannot be read or written.
 pub fn certified(what: &What, bench: &dyn Bench) -> miette::Result<Issued> {
-    match what {
-        What::Force(args) => force::certified(args, bench),
-        What::Amplitude(args) => amplitude::certified(args, bench),
-        What::Latency(args) => latency::certified(args),
-        What::Phase(args) => phase::certified(args, bench),
-        What::Finger(args) => finger::certified(args),
-        What::Creep(args) => creep::certified(args),
-        What::Gravity(args) => gravity::certified(args),
-        What::Noise(args) => noise::certified(args),
-        What::Step(args) => dynamics::step(args),
-        What::Tap(args) => dynamics::tap(args),
-    }
+    let (sources, mut more) = (&mut Sources::default(), More::new());
+    let (common, outcome) = match what {
+        What::Force(args) => (&args.common, force::outcome_of(args, bench, sources)?),
+        What::Amplitude(of) => (&of.common, amplitude::outcome_of(of, bench, sources)?),
+        What::Latency(of) => (&of.common, latency::outcome_of(&of.args, sources)?),
+        What::Phase(of) => (&of.common, phase::outcome_of(&of.args, bench, sources)?),
+        What::Finger(of) => (&of.common, finger::outcome_of(&of.args, sources, &mut more)?),
+        What::Creep(of) => (&of.common, creep::outcome_of(&of.args, sources)?),
+        What::Gravity(of) => (&of.common, gravity::outcome_of(&of.args, sources)?),
+        What::Noise(of) => (&of.common, noise::outcome_of(&of.args, sources)?),
+        What::Step(of) => (&of.common, dynamics::step(&of.args, sources)?),
+        What::Tap(of) => (&of.common, dynamics::tap(&of.args, sources)?),
+    };
+    Ok(Issued { more, ..common.certify(outcome, sources.raw_data())? })
 }
 
 /// The certificate that a command line of `muprime calibrate` comes to (`words` begin after `calibrate`), from files alone: what would
@@ -211,13 +223,16 @@ pub fn document(certificate: &Certificate) -> serde_json::Value {
     })
 }
 
+/// What a fit says beyond its certificate: keys of the JSON document, and their values.
+type More = Vec<(&'static str, serde_json::Value)>;
+
 /// A certificate that was made and not yet written.
 #[derive(Debug)]
 pub struct Issued {
     /// The certificate.
     pub certificate: Certificate,
     /// What the fit says beyond it: keys of the JSON document, and their values.
-    pub more: Vec<(&'static str, serde_json::Value)>,
+    pub more: More,
     /// Where it goes.
     pub out: PathBuf,
     /// Whether a certificate that is there may be written over.
@@ -257,6 +272,11 @@ fn now_unix_s() -> miette::Result<i64> {
 }
 
 impl Common {
+    /// Where the table goes that is taken live for a certificate of a kind: beside it.
+    fn beside(&self, kind: &str) -> PathBuf {
+        self.out.clone().unwrap_or_else(|| format!("{kind}.toml").into()).with_extension("csv")
+    }
+
     fn occasion(&self, raw_data: RawData) -> miette::Result<Occasion> {
         let unix_s = match &self.date {
             None => now_unix_s()?,

@@ -1,7 +1,6 @@
 //! `muprime calibrate amplitude`.
 
-use super::tables::{Sources, columns};
-use super::{Bench, Common, Issued, LiveTable, displacement};
+use super::{Bench, LiveTable, Of, Outcome, Sources, columns, displacement};
 use calibration::amplitude::apply::AmplitudeFit;
 use calibration::amplitude::droop::{Exponent, droop};
 use calibration::amplitude::gain::{Form, fit};
@@ -65,8 +64,6 @@ pub struct Args {
     /// Temperatures at which the certificate holds in deg C [default: not limited]
     #[arg(long, num_args = 2, value_names = ["LOW", "HIGH"], allow_negative_numbers = true)]
     temperature_c: Option<Vec<f64>>,
-    #[command(flatten)]
-    common: Common,
 }
 
 #[derive(Clone, Copy, Debug, clap::ValueEnum)]
@@ -79,15 +76,15 @@ enum FormChoice {
     Bent,
 }
 
-/// Calibrates.
-pub fn certified(args: &Args, bench: &dyn Bench) -> miette::Result<Issued> {
+/// Calibrates; a table that is taken live goes beside the certificate.
+pub fn outcome_of(of: &Of<Args>, bench: &dyn Bench, sources: &mut Sources) -> miette::Result<Outcome> {
+    let (args, keep) = (&of.args, &*of.common.beside("amplitude"));
     let unit = match args.set_point.as_str() {
         "set_point_pp_m" => "m",
         "current_a" => "A",
         other => miette::bail!("--set-point {other}: set_point_pp_m or current_a"),
     };
-    let mut sources = Sources::default();
-    let refused = |path: &PathBuf| {
+    let refused = |path: &Path| {
         let shown = path.display().to_string();
         move |e: AmplitudeError| miette::miette!("{shown}: no certificate: {e}")
     };
@@ -102,25 +99,25 @@ pub fn certified(args: &Args, bench: &dyn Bench) -> miette::Result<Issued> {
             miette::bail!("--live drives amplitudes in m: take the table of a drive of current by hand")
         }
         (None, _) => {
-            let (path, settings) = live_table(args, bench)?;
-            (path.clone(), points_of(&mut sources, &path, &args.set_point)?, Some(settings))
+            let settings = live_table(args, bench, keep)?;
+            (keep, points_of(sources, keep, &args.set_point)?, Some(settings))
         }
-        (Some(path), false) => (path.clone(), points_of(&mut sources, path, &args.set_point)?, None),
+        (Some(path), false) => (path.as_path(), points_of(sources, path, &args.set_point)?, None),
         (Some(path), true) => {
             let settings = bench.vibrometer(&with_vibrometer(args)?, args.frequency_hz)?;
             say!("vibrometer: {settings}");
-            let rows = columns(&mut sources, path, [args.set_point.as_str(), "velocity_v"], &[])?;
+            let rows = columns(sources, path, [args.set_point.as_str(), "velocity_v"], &[])?;
             let convert = |(row, [at, volts]): (usize, [f64; 2])| {
                 displacement(volts, settings.range_m_s_per_v, args.frequency_hz)
                     .map(|w| AmplitudePoint { at, amplitude_pp_m: w.metres() })
                     .map_err(|e| miette::miette!("{}: row {}: {e}", path.display(), row + 1))
             };
             let table = rows.into_iter().enumerate().map(convert).collect::<miette::Result<Vec<_>>>()?;
-            (path.clone(), table, Some(settings.to_string()))
+            (path.as_path(), table, Some(settings.to_string()))
         }
     };
-    let gain = fit(&table, form, args.vibrometer_relative_sd).map_err(refused(&path))?;
-    let mut points = |path: &PathBuf, at: &str| points_of(&mut sources, path, at);
+    let gain = fit(&table, form, args.vibrometer_relative_sd).map_err(refused(path))?;
+    let mut points = |path: &PathBuf, at: &str| points_of(sources, path, at);
     let resonance = |path| sweep(&points(path, "frequency_hz")?).map_err(refused(path));
     let resonance = args.sweep.as_ref().map(resonance).transpose()?;
     let shape = |path| mode_shape(&points(path, "position_m")?).map_err(refused(path));
@@ -148,7 +145,7 @@ pub fn certified(args: &Args, bench: &dyn Bench) -> miette::Result<Issued> {
             miette::bail!("--temperature-c {other:?}: two of -40 to 100 deg C, the lower one first")
         }
     };
-    args.common.certify(outcome, sources.raw_data())
+    Ok(outcome)
 }
 
 fn points_of(sources: &mut Sources, path: &Path, at: &str) -> miette::Result<Vec<AmplitudePoint>> {
@@ -161,15 +158,14 @@ fn with_vibrometer(args: &Args) -> miette::Result<Setup> {
     Setup::load(name)
 }
 
-/// Takes the table live and keeps it beside the certificate; its path, and the vibrometer's settings in words.
-fn live_table(args: &Args, bench: &dyn Bench) -> miette::Result<(PathBuf, String)> {
+/// Takes the table live and keeps it; the vibrometer's settings in words.
+fn live_table(args: &Args, bench: &dyn Bench, keep: &Path) -> miette::Result<String> {
     let setup = with_vibrometer(args)?;
     let &Args { ref live, frequency_hz, passes, settle_s, .. } = args;
     let table = LiveTable { set_points_pp_m: live, frequency_hz, passes, settle_s };
     let text = bench.amplitudes(&setup, &table)?;
-    let path = args.common.out.clone().unwrap_or_else(|| "amplitude.toml".into()).with_extension("csv");
-    runs::files::write_whole(&path, &text)?;
-    say!("the table is in {}", path.display());
+    runs::files::write_whole(keep, &text)?;
+    say!("the table is in {}", keep.display());
     let settings = text.lines().next().and_then(|l| l.strip_prefix("# vibrometer: ")).unwrap_or_default();
-    Ok((path, settings.to_string()))
+    Ok(settings.to_string())
 }

@@ -1,7 +1,6 @@
 //! `muprime calibrate creep`: how a reading goes on changing under a load that does not.
 
-use super::tables::{Sources, columns};
-use super::{Common, Issued};
+use super::{Outcome, Sources, columns};
 use calibration::certificate::{Finding, Residuals};
 use calibration::force::characteristics::outcome;
 use calibration::force::creep::Creep;
@@ -12,14 +11,11 @@ use std::path::PathBuf;
 pub struct Args {
     /// Readings after a load was put on, as CSV: time_s (since then), net_counts (zero taken off)
     readings: PathBuf,
-    #[command(flatten)]
-    common: Common,
 }
 
 /// Calibrates.
-pub fn certified(args: &Args) -> miette::Result<Issued> {
-    let mut sources = Sources::default();
-    let rows = columns(&mut sources, &args.readings, ["time_s", "net_counts"], &[])?;
+pub fn outcome_of(args: &Args, sources: &mut Sources) -> miette::Result<Outcome> {
+    let rows = columns(sources, &args.readings, ["time_s", "net_counts"], &[])?;
     let shown = args.readings.display();
     if rows.iter().any(|r| r[0] < 0.0) || rows.windows(2).any(|w| w[1][0] <= w[0][0]) {
         miette::bail!("{shown}: time_s counts from the load on and must rise from row to row");
@@ -48,5 +44,5 @@ pub fn certified(args: &Args) -> miette::Result<Issued> {
     let (count, [sd, largest]) = (rows.len() as u64, found.residual);
     let residuals = Residuals { count, sd, largest, unit: "counts".into(), lack_of_fit_p: None };
     let model = "counts(t) = c0 (1 + relative (1 - exp(-t / time_constant)))";
-    args.common.certify(outcome(model, &findings, residuals, remarks), sources.raw_data())
+    Ok(outcome(model, &findings, residuals, remarks))
 }

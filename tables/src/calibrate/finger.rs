@@ -1,8 +1,8 @@
 //! `muprime calibrate finger`.
 
-use super::tables::{Sources, columns};
-use super::{Common, Issued, inverse};
-use calibration::finger::stiffness::{Stiffness, UltrasonicPoint, quasi_static, ultrasonic};
+use super::inverse::{self, Options};
+use super::{More, Outcome, Sources, columns};
+use calibration::finger::stiffness::{UltrasonicPoint, quasi_static, ultrasonic};
 use calibration::finger::{FingerError, FingerFit, friction, springs};
 use calibration::phase::table::read_phases;
 use models::rig_file::PassNoise;
@@ -58,46 +58,35 @@ pub struct Args {
     /// Relative standard uncertainty of force over displacement (from their certificates)
     #[arg(long, default_value_t = 0.02)]
     scale_relative_sd: f64,
-    #[command(flatten)]
-    common: Common,
 }
 
-/// Calibrates.
-pub fn certified(args: &Args) -> miette::Result<Issued> {
-    let mut sources = Sources::default();
+/// Calibrates; the skin and the springs that were identified go into `more`.
+pub fn outcome_of(args: &Args, sources: &mut Sources, more: &mut More) -> miette::Result<Outcome> {
     let mut found = FingerFit::default();
     let refused = |path: &PathBuf, e: FingerError| miette::miette!("{}: no certificate: {e}", path.display());
     for (name, path) in
         [("normal_quasi_static", &args.normal_loop), ("lateral_quasi_static", &args.lateral_loop)]
     {
         let Some(path) = path else { continue };
-        let rows = columns(&mut sources, path, ["displacement_m", "force_n", "up"], &["up"])?;
+        let rows = columns(sources, path, ["displacement_m", "force_n", "up"], &["up"])?;
         let points: Vec<(f64, f64, bool)> = rows.iter().map(|r| (r[0], r[1], r[2] != 0.0)).collect();
-        let stiffness =
-            quasi_static(&points, args.about_m, args.scale_relative_sd).map_err(|e| refused(path, e))?;
-        found.stiffness.push((name.into(), stiffness));
+        let stiffness = quasi_static(&points, args.about_m, args.scale_relative_sd);
+        found.stiffness.push((name.into(), stiffness.map_err(|e| refused(path, e))?));
     }
-    for (name, path) in
-        [("normal_ultrasonic", &args.normal_ultrasonic), ("lateral_ultrasonic", &args.lateral_ultrasonic)]
-    {
+    // Normal contact must not be lost; along the plate there is no such limit.
+    for (name, path, load_n) in [
+        ("normal_ultrasonic", &args.normal_ultrasonic, args.normal_force_n),
+        ("lateral_ultrasonic", &args.lateral_ultrasonic, Some(f64::INFINITY)),
+    ] {
         let Some(path) = path else { continue };
-        let rows = columns(&mut sources, path, ["amplitude_m", "in_phase_n", "quadrature_n"], &[])?;
-        let points: Vec<UltrasonicPoint> = rows
-            .iter()
-            .map(|r| UltrasonicPoint { amplitude_m: r[0], in_phase_n: r[1], quadrature_n: r[2] })
-            .collect();
-        let load = if name == "normal_ultrasonic" {
-            args.normal_force_n.ok_or_else(|| {
-                miette::miette!(
-                    "--normal-ultrasonic needs --normal-force-n: it decides whether contact was lost"
-                )
-            })?
-        } else {
-            f64::INFINITY
-        };
-        let stiffness: Stiffness =
-            ultrasonic(&points, load, args.scale_relative_sd).map_err(|e| refused(path, e))?;
-        found.stiffness.push((name.into(), stiffness));
+        let rows = columns(sources, path, ["amplitude_m", "in_phase_n", "quadrature_n"], &[])?;
+        let point =
+            |r: &[f64; 3]| UltrasonicPoint { amplitude_m: r[0], in_phase_n: r[1], quadrature_n: r[2] };
+        let points: Vec<UltrasonicPoint> = rows.iter().map(point).collect();
+        let lacks = "--normal-ultrasonic needs --normal-force-n: it decides whether contact was lost";
+        let load_n = load_n.ok_or_else(|| miette::miette!("{lacks}"))?;
+        let stiffness = ultrasonic(&points, load_n, args.scale_relative_sd);
+        found.stiffness.push((name.into(), stiffness.map_err(|e| refused(path, e))?));
     }
     if let Some(path) = &args.friction {
         let bytes = sources.read(path)?;
@@ -118,14 +107,10 @@ pub fn certified(args: &Args) -> miette::Result<Issued> {
     if let Some(path) = &args.phases {
         let bytes = sources.read(path)?;
         let points = read_phases(bytes.as_slice()).map_err(|e| miette::miette!("{}: {e}", path.display()))?;
-        let options = inverse::Options {
-            frequency_hz: args.frequency_hz,
-            normal_force_n: args.normal_force_n,
-            modulus_range_pa: (args.modulus_range_pa[0], args.modulus_range_pa[1]),
-            elements: args.elements,
-            modulus_only: args.modulus_only,
-            shown: true,
-        };
+        let &Args { frequency_hz, normal_force_n, elements, modulus_only, .. } = args;
+        let (modulus_range_pa, shown) = ((args.modulus_range_pa[0], args.modulus_range_pa[1]), true);
+        let options =
+            Options { frequency_hz, normal_force_n, modulus_range_pa, elements, modulus_only, shown };
         let (modulus, skin) =
             inverse::analyse(&options, &points).map_err(|e| e.wrap_err(path.display().to_string()))?;
         (found.modulus, found.skin) = (Some(modulus), skin);
@@ -136,8 +121,7 @@ pub fn certified(args: &Args) -> miette::Result<Issued> {
             "nothing to calibrate: give a phase table, a loop, ultrasonic data, friction passes, or a run's passes"
         );
     }
-    let identified = serde_json::json!({ "elastic": found.modulus, "all_free": found.skin });
-    let springs = serde_json::json!(found.springs);
-    let more = vec![("skin", identified), ("springs", springs)];
-    Ok(Issued { more, ..args.common.certify(found.outcome(), sources.raw_data())? })
+    more.push(("skin", serde_json::json!({ "elastic": found.modulus, "all_free": found.skin })));
+    more.push(("springs", serde_json::json!(found.springs)));
+    Ok(found.outcome())
 }

@@ -1,7 +1,6 @@
 //! `muprime calibrate force`.
 
-use super::tables::{Sources, with_columns};
-use super::{Bench, Common, Issued, SeriesOptions};
+use super::{Bench, Common, Outcome, SeriesOptions, Sources, with_columns};
 use calibration::force::matrix::{Linearity, Options, fit};
 use calibration::force::series::{self, Weighing};
 use runs::say;
@@ -14,7 +13,7 @@ pub struct Args {
     /// normal_counts; optional branch (up, down), temperature_c, saturated. Left out: guided at the terminal
     series: Option<PathBuf>,
     #[command(flatten)]
-    common: Common,
+    pub common: Common,
     /// Guided: read the counts from the force instruments of this setup (bundled name or file)
     #[arg(long)]
     setup: Option<String>,
@@ -54,7 +53,7 @@ pub struct Args {
 }
 
 /// Calibrates.
-pub fn certified(args: &Args, bench: &dyn Bench) -> miette::Result<Issued> {
+pub fn outcome_of(args: &Args, bench: &dyn Bench, sources: &mut Sources) -> miette::Result<Outcome> {
     let weighing = Weighing {
         gravity_m_s2: args.gravity_m_s2,
         gravity_relative_sd: args.gravity_relative_sd,
@@ -63,18 +62,15 @@ pub fn certified(args: &Args, bench: &dyn Bench) -> miette::Result<Issued> {
         ..Weighing::default()
     };
     if !(9.7..9.9).contains(&weighing.gravity_m_s2) {
-        miette::bail!("--gravity-m-s2 {}: on the ground it is between 9.76 and 9.84", weighing.gravity_m_s2);
+        miette::bail!("--gravity-m-s2 {}: on the ground it is between 9.76 and 9.84", args.gravity_m_s2);
     }
-    let mut sources = Sources::default();
     let (name, bytes) = match &args.series {
         Some(path) => (path.display().to_string(), sources.read(path)?),
         None => {
-            let beside = args.common.out.clone().unwrap_or_else(|| "force.toml".into()).with_extension("csv");
-            let path = args.save_series.clone().unwrap_or(beside);
+            let keep = &args.save_series.clone().unwrap_or_else(|| args.common.beside("force"));
             let (setup, &Args { average_s, reconnect_s, .. }) = (args.setup.as_deref(), args);
-            let options = SeriesOptions { setup, average_s, reconnect_s, keep: &path };
-            let text = bench.series(&options)?;
-            let name = path.display().to_string();
+            let text = bench.series(&SeriesOptions { setup, average_s, reconnect_s, keep })?;
+            let name = keep.display().to_string();
             say!("the series is in {name}");
             let bytes = sources.add(&name, text.into_bytes())?;
             (name, bytes)
@@ -90,5 +86,5 @@ pub fn certified(args: &Args, bench: &dyn Bench) -> miette::Result<Issued> {
     };
     let found =
         fit(&readings, &weighing, &options).map_err(|e| miette::miette!("{name}: no certificate: {e}"))?;
-    args.common.certify(found.outcome(&weighing), sources.raw_data())
+    Ok(found.outcome(&weighing))
 }

@@ -1,7 +1,6 @@
 //! `muprime calibrate gravity`: where the sensor's axes point, by its own weight at known tilts.
 
-use super::tables::{Sources, columns};
-use super::{Common, Issued};
+use super::{Outcome, Sources, columns};
 use calibration::certificate::{Finding, Residuals};
 use calibration::force::characteristics::outcome;
 use calibration::force::gravity::{TiltReading, orientation};
@@ -13,14 +12,11 @@ pub struct Args {
     /// Calibrated forces at each tilt, as CSV: tilt_rad (about the axis across the stroke, positive where the
     /// lateral share of gravity grows), lateral_force_n, normal_force_n (zeros not taken off)
     tilts: PathBuf,
-    #[command(flatten)]
-    common: Common,
 }
 
 /// Calibrates.
-pub fn certified(args: &Args) -> miette::Result<Issued> {
-    let mut sources = Sources::default();
-    let rows = columns(&mut sources, &args.tilts, ["tilt_rad", "lateral_force_n", "normal_force_n"], &[])?;
+pub fn outcome_of(args: &Args, sources: &mut Sources) -> miette::Result<Outcome> {
+    let rows = columns(sources, &args.tilts, ["tilt_rad", "lateral_force_n", "normal_force_n"], &[])?;
     let shown = args.tilts.display();
     let readings: Vec<TiltReading> =
         rows.iter().map(|r| TiltReading { tilt_rad: r[0], force_n: [r[1], r[2]] }).collect();
@@ -47,5 +43,5 @@ pub fn certified(args: &Args) -> miette::Result<Issued> {
     let count = 2 * rows.len() as u64;
     let residuals = Residuals { count, sd, largest, unit: "N".into(), lack_of_fit_p: None };
     let model = "F_lateral = W sin(tilt + angle) + o_lateral, F_normal = W cos(tilt + angle) + o_normal";
-    args.common.certify(outcome(model, &findings, residuals, remarks), sources.raw_data())
+    Ok(outcome(model, &findings, residuals, remarks))
 }

@@ -1,7 +1,6 @@
 //! `muprime calibrate latency`.
 
-use super::tables::{Sources, columns};
-use super::{Common, Issued};
+use super::{Outcome, Sources, columns};
 use calibration::force::dynamics::step_response;
 use calibration::latency::{channel_delay, clock, outcome};
 use calibration::uncertainty::Input;
@@ -22,16 +21,13 @@ pub struct Args {
     /// Resolution of the events' times (stage time stamps) in s
     #[arg(long, default_value_t = 0.0)]
     resolution_s: f64,
-    #[command(flatten)]
-    common: Common,
 }
 
 /// Calibrates.
-pub fn certified(args: &Args) -> miette::Result<Issued> {
+pub fn outcome_of(args: &Args, sources: &mut Sources) -> miette::Result<Outcome> {
     if args.edges.is_empty() && args.steps.is_empty() && args.clock.is_empty() {
         miette::bail!("give --edges, --steps or --clock at least once, as CHANNEL=FILE");
     }
-    let mut sources = Sources::default();
     let mut channels = Vec::new();
     let mut remarks = Vec::new();
     let delay = |channel, delays: &[f64], given: &String| {
@@ -39,12 +35,12 @@ pub fn certified(args: &Args) -> miette::Result<Issued> {
     };
     for given in &args.edges {
         let (channel, path) = split(given)?;
-        let delays: Vec<f64> = columns(&mut sources, &path, ["delay_s"], &[])?.iter().map(|r| r[0]).collect();
+        let delays: Vec<f64> = columns(sources, &path, ["delay_s"], &[])?.iter().map(|r| r[0]).collect();
         channels.push(delay(channel, &delays, given)?);
     }
     for given in &args.steps {
         let (channel, path) = split(given)?;
-        let rows = columns(&mut sources, &path, ["edge", "time_s", "value"], &[])?;
+        let rows = columns(sources, &path, ["edge", "time_s", "value"], &[])?;
         let (mut delays, mut bandwidths) = (Vec::new(), Vec::new());
         for edge in rows.chunk_by(|a, b| a[0] == b[0]) {
             let (time, value): (Vec<f64>, Vec<f64>) = edge.iter().map(|r| (r[1], r[2])).unzip();
@@ -60,15 +56,13 @@ pub fn certified(args: &Args) -> miette::Result<Issued> {
     let mut clocks = Vec::new();
     for given in &args.clock {
         let (channel, path) = split(given)?;
-        let rows = columns(&mut sources, &path, ["host_s", "device_s"], &[])?;
+        let rows = columns(sources, &path, ["host_s", "device_s"], &[])?;
         let (host, device): (Vec<f64>, Vec<f64>) = rows.iter().map(|r| (r[0], r[1])).unzip();
         let found = clock::compare(&host, &device).map_err(|e| miette::miette!("{given}: {e}"))?;
         if found.rate_error[0].abs() > 0.01 {
             let rate = 1.0 + found.rate_error[0];
-            miette::bail!(
-                help = "both are in seconds, and a counter that starts over must be unwrapped",
-                "{given}: device_s rises {rate:.4} times as fast as host_s"
-            );
+            let help = "both are in seconds, and a counter that starts over must be unwrapped";
+            miette::bail!(help = help, "{given}: device_s rises {rate:.4} times as fast as host_s");
         }
         remarks.push(format!(
             "{channel}: arrivals scatter by {:.2e} s about the device's clock",
@@ -78,7 +72,7 @@ pub fn certified(args: &Args) -> miette::Result<Issued> {
     }
     let mut found = outcome(&channels, &clocks);
     found.remarks.extend(remarks);
-    args.common.certify(found, sources.raw_data())
+    Ok(found)
 }
 
 fn split(given: &str) -> miette::Result<(&str, PathBuf)> {

@@ -1,7 +1,6 @@
 //! `muprime calibrate noise`: spectrum, lines, quantisation of a sensor at rest, and the rule for a frozen value.
 
-use super::tables::{Sources, columns};
-use super::{Common, Issued};
+use super::{Outcome, Sources, columns};
 use calibration::certificate::{Finding, Residuals};
 use calibration::force::characteristics::outcome;
 use calibration::force::noise::{
@@ -29,8 +28,6 @@ pub struct Args {
     /// Where the spectra go, as CSV: frequency_hz, lateral_counts2_per_hz, normal_counts2_per_hz
     #[arg(long)]
     spectrum: Option<PathBuf>,
-    #[command(flatten)]
-    common: Common,
 }
 
 /// The end at which samples are cut off: there are more at it than anywhere, and ten times as many as at the
@@ -46,15 +43,14 @@ fn rail(samples: &[i64]) -> Option<i64> {
 }
 
 /// Calibrates.
-pub fn certified(args: &Args) -> miette::Result<Issued> {
+pub fn outcome_of(args: &Args, sources: &mut Sources) -> miette::Result<Outcome> {
     if !(args.rate_hz > 0.0 && args.rate_hz.is_finite()) {
         miette::bail!("--rate-hz {}: above zero", args.rate_hz);
     }
     if !(args.false_alarm > 0.0 && args.false_alarm < 0.01) {
         miette::bail!("--false-alarm {}: above 0 and below 0.01", args.false_alarm);
     }
-    let mut sources = Sources::default();
-    let rows = columns(&mut sources, &args.samples, ["lateral_counts", "normal_counts"], &[])?;
+    let rows = columns(sources, &args.samples, ["lateral_counts", "normal_counts"], &[])?;
     let shown = args.samples.display();
     let (mut findings, mut remarks, mut spectra, mut frozen) =
         (Vec::new(), Vec::new(), Vec::new(), Vec::new());
@@ -137,5 +133,5 @@ pub fn certified(args: &Args) -> miette::Result<Issued> {
     if let Some(n) = frozen_after {
         found.settings.insert("frozen_after".into(), n.to_string());
     }
-    args.common.certify(found, sources.raw_data())
+    Ok(found)
 }

@@ -1,7 +1,6 @@
 //! `muprime calibrate phase`: the paper's section 2 from recorded waveforms.
 
-use super::tables::{Sources, columns};
-use super::{Bench, Common, Issued};
+use super::{Bench, Outcome, Sources, columns};
 use calibration::amplitude::vibrometer::{Decoder, amplitude};
 use calibration::phase::{
     Acquisition, PhasePoint, RepeatedShift, Shift, Waveforms, outcome, repeated, shift, write_phases,
@@ -55,12 +54,10 @@ pub struct Args {
     /// The phase table that is written
     #[arg(long, default_value = "PHASES.csv")]
     phases: PathBuf,
-    #[command(flatten)]
-    common: Common,
 }
 
 /// Calibrates.
-pub fn certified(args: &Args, bench: &dyn Bench) -> miette::Result<Issued> {
+pub fn outcome_of(args: &Args, bench: &dyn Bench, sources: &mut Sources) -> miette::Result<Outcome> {
     let settings = |name: &String| bench.vibrometer(&Setup::load(name)?, args.frequency_hz);
     let settings = args.setup.as_ref().map(settings).transpose()?;
     settings.iter().for_each(|settings| say!("vibrometer: {settings}"));
@@ -78,10 +75,9 @@ pub fn certified(args: &Args, bench: &dyn Bench) -> miette::Result<Issued> {
     };
     let plate = decoder("plate", &args.plate_range, &args.plate_delay)?;
     let skin = decoder("skin", &args.skin_range, &args.skin_delay)?;
-    let mut sources = Sources::default();
     let mut shifts: Vec<(f64, Shift)> = Vec::new();
     for path in &args.waveforms {
-        let rows = columns(&mut sources, path, ["plate_v", "skin_v"], &[])?;
+        let rows = columns(sources, path, ["plate_v", "skin_v"], &[])?;
         let (plate_v, skin_v): (Vec<f64>, Vec<f64>) = rows.iter().map(|r| (r[0], r[1])).unzip();
         let (rate_hz, frequency_hz) = (args.rate_hz, args.frequency_hz);
         let (plate_v, skin_v) = (&plate_v[..], &skin_v[..]);
@@ -115,12 +111,8 @@ pub fn certified(args: &Args, bench: &dyn Bench) -> miette::Result<Issued> {
     write_phases(&mut table, &points).map_err(|e| miette::miette!("{e}"))?;
     runs::files::write_whole(&args.phases, &table)?;
     say!("{} amplitudes: {}", points.len(), args.phases.display());
-    let acquisition = Acquisition {
-        frequency_hz: args.frequency_hz,
-        delay_sd_s: args.delay_sd_s,
-        condition: args.condition.clone(),
-        normal_force_n: args.normal_force_n,
-    };
+    let (&Args { frequency_hz, delay_sd_s, normal_force_n, .. }, condition) = (args, args.condition.clone());
+    let acquisition = Acquisition { frequency_hz, delay_sd_s, condition, normal_force_n };
     let mut outcome = outcome(&found, &acquisition);
     outcome.remarks.push(format!(
         "decoders: plate {:e} m/s/V and {:.3} \u{b5}s, skin {:e} m/s/V and {:.3} \u{b5}s{}",
@@ -130,5 +122,5 @@ pub fn certified(args: &Args, bench: &dyn Bench) -> miette::Result<Issued> {
         skin.delay_s * 1e6,
         settings.map_or(String::new(), |s| format!("; read back from the vibrometer: {s}"))
     ));
-    args.common.certify(outcome, sources.raw_data())
+    Ok(outcome)
 }

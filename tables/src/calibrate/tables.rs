@@ -132,10 +132,8 @@ pub fn with_columns(name: &str, bytes: &[u8], needed: &[&str]) -> miette::Result
     let headers = reader(bytes).headers().map_err(|e| miette::miette!("{name}: {e}"))?.clone();
     if let Some(lacks) = needed.iter().find(|column| headers.iter().all(|h| h != **column)) {
         let has = headers.iter().collect::<Vec<_>>().join(", ");
-        miette::bail!(
-            help = "docs/calibration.md shows a table",
-            "{name}: column `{lacks}` is missing; the file has: {has}"
-        );
+        let help = "docs/calibration.md shows a table";
+        miette::bail!(help = help, "{name}: column `{lacks}` is missing; the file has: {has}");
     }
     Ok(headers)
 }
