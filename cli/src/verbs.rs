@@ -127,13 +127,9 @@ pub fn there(path: &Path, what: &str) -> miette::Result<()> {
 /// What is there instead of it.
 fn not_there(path: &Path, what: &str) -> miette::Report {
     let folder = ::runs::catalogue::runs_folder();
-    let mut runs: Vec<String> = std::fs::read_dir(&folder)
-        .into_iter()
-        .flatten()
-        .flatten()
-        .filter(|entry| entry.path().join(::runs::run_dir::JOURNAL).exists())
-        .map(|entry| folder.join(entry.file_name()).display().to_string())
-        .collect();
+    let beside = std::fs::read_dir(&folder).into_iter().flatten().flatten().map(|entry| entry.path());
+    let runs = beside.filter(|path| path.join(::runs::run_dir::JOURNAL).exists());
+    let mut runs: Vec<String> = runs.map(|run| run.display().to_string()).collect();
     runs.sort();
     let help = match runs.as_slice() {
         _ if path.is_file() => "a run is a folder: give the one that the file is in".to_string(),

@@ -1,4 +1,4 @@
-//! The ultrasonic amplifier: quantised set-points, an enable, a heartbeat watchdog of its own, a supply relay.
+//! The ultrasonic amplifier: quantised set-points, an enable, a heartbeat watchdog, a supply relay.
 //!
 //! The watchdog is the amplifier's: when no command with a new heartbeat has come for its timeout it switches
 //! the output off by itself and stays off until commanded off and on again. The supply relay is a second,

@@ -63,18 +63,14 @@ impl Stratum {
     }
 
     fn kinds(self, noise: &mut Noise) -> Vec<&'static DefectKind> {
-        let pool: Vec<&'static DefectKind> = ALL
-            .iter()
-            .copied()
-            .filter(|kind| kind.in_tables)
-            .filter(|kind| match self {
-                Stratum::None => false,
-                Stratum::Single => kind.in_library && !kind.imitated,
-                Stratum::Pair => kind.in_library,
-                Stratum::Alias => kind.imitated,
-                Stratum::Outside => !kind.in_library,
-            })
-            .collect();
+        let has = |kind: &&DefectKind| match self {
+            Stratum::None => false,
+            Stratum::Single => kind.in_library && !kind.imitated,
+            Stratum::Pair => kind.in_library,
+            Stratum::Alias => kind.imitated,
+            Stratum::Outside => !kind.in_library,
+        };
+        let pool: Vec<_> = ALL.iter().copied().filter(|kind| kind.in_tables && has(kind)).collect();
         if pool.is_empty() {
             return pool;
         }
@@ -202,14 +198,11 @@ impl SealedRig {
     /// Measures further passes in a new run, in the order given. Of a condition, `time_s` and `mu0` are not
     /// used: passes follow each other at the set's pace.
     pub fn measure(&mut self, conditions: &[Condition]) -> Vec<Pass> {
-        let planned: Vec<Planned> = conditions
-            .iter()
-            .enumerate()
-            .map(|(i, condition)| {
-                let condition = Condition { time_s: 5.0 + i as f64 * self.pace_s, ..*condition };
-                Planned { condition, replicate: 0, run: self.runs }
-            })
-            .collect();
+        let plan = |(i, condition): (usize, &Condition)| {
+            let condition = Condition { time_s: 5.0 + i as f64 * self.pace_s, ..*condition };
+            Planned { condition, replicate: 0, run: self.runs }
+        };
+        let planned: Vec<Planned> = conditions.iter().enumerate().map(plan).collect();
         let points = self.bench.circumstances(&planned, true, &mut self.noise);
         let mut passes = self.bench.measure(&points, &planned, &self.defects, &mut self.noise);
         for pass in &mut passes {

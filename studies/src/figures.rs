@@ -141,12 +141,10 @@ pub fn phase_shift(base: RidgeCase, out: &Path, reading: Reading) -> miette::Res
     };
     let mut lines = Vec::new();
     for (what, e, paper) in [("moist", 28.3e6, "0.8 to 1.3"), ("dry", 202.4e6, "0.4 to 0.8")] {
+        let [at_10, at_30, at_60] = [10.0, 30.0, 60.0].map(|level| crossing(e, level));
         lines.push(format!(
-            "{what} ({} MPa): the phase passes 10, 30 and 60 deg at {}, {} and {} \u{b5}m; paper: transition at {paper} \u{b5}m, plateau near 90 deg; here {:.0} deg at 2.5 \u{b5}m",
+            "{what} ({} MPa): the phase passes 10, 30 and 60 deg at {at_10}, {at_30} and {at_60} \u{b5}m; paper: transition at {paper} \u{b5}m, plateau near 90 deg; here {:.0} deg at 2.5 \u{b5}m",
             e / 1e6,
-            crossing(e, 10.0),
-            crossing(e, 30.0),
-            crossing(e, 60.0),
             curve(e).last().map_or(f64::NAN, |p| p.1)
         ));
     }
@@ -292,12 +290,9 @@ pub fn parametric_study(study: Study, out: &Path) -> miette::Result<Reproduced> 
             values.map(|v| Series::line(format!("{} {v}", panel.variable()), curve(v))).into(),
         ));
         let row = |w: f64| values.map(|v| format!("{:.3}", at(panel, v, w))).join(" ");
+        let (varied, [at_1, at_2_5, at_5]) = (panel.variable(), [1e-6, 2.5e-6, 5e-6].map(row));
         lines.push(format!(
-            "({letter}) {} {values:?}: mu' at 1 \u{b5}m {}, at 2.5 \u{b5}m {}, at 5 \u{b5}m {}",
-            panel.variable(),
-            row(1e-6),
-            row(2.5e-6),
-            row(5e-6)
+            "({letter}) {varied} {values:?}: mu' at 1 \u{b5}m {at_1}, at 2.5 \u{b5}m {at_2_5}, at 5 \u{b5}m {at_5}"
         ));
     }
     let spread = |panel: Panel| {
@@ -313,8 +308,7 @@ pub fn parametric_study(study: Study, out: &Path) -> miette::Result<Reproduced> 
     ));
     let [least, greatest] = ends(found.iter().map(|f| f.1.reaction_over_load));
     lines.push(format!(
-        "mean reaction over load: {:.3} to {:.3} over the study (paper: 1, Eq. 4)",
-        least, greatest
+        "mean reaction over load: {least:.3} to {greatest:.3} over the study (paper: 1, Eq. 4)"
     ));
     Ok(Reproduced { charts, lines })
 }

@@ -85,11 +85,8 @@ fn empty(folder: &Path) -> miette::Result<()> {
     if std::fs::read_dir(folder).is_ok_and(|mut found| found.next().is_none()) || !folder.exists() {
         return Ok(());
     }
-    miette::bail!(
-        help = "give an empty or new folder as --write",
-        "{} exists and is not an empty folder: nothing was replaced",
-        folder.display()
-    )
+    let help = "give an empty or new folder as --write";
+    miette::bail!(help = help, "{} exists and is not an empty folder: nothing was replaced", folder.display())
 }
 
 /// Figures and answers of the sets that were scored.

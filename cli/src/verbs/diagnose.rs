@@ -88,11 +88,8 @@ impl<'a> Inputs<'a> {
         let run = args.data.first().filter(|data| args.data.len() == 1 && data.is_dir()).map(|data| &**data);
         if args.in_folder && run.is_none() {
             let what = if args.data.len() > 1 { "several are given" } else { "this is a table" };
-            miette::bail!(
-                help = "give the folder of one run",
-                "--in-folder: {}: {what}",
-                args.data[0].display()
-            );
+            let help = "give the folder of one run";
+            miette::bail!(help = help, "--in-folder: {}: {what}", args.data[0].display());
         }
         Ok(Inputs { tables, rig, run })
     }
@@ -147,11 +144,8 @@ fn places(args: &Args) -> miette::Result<()> {
         let place = std::path::absolute(path).into_diagnostic()?;
         let place = place.canonicalize().unwrap_or(place);
         if let Some((other, _)) = taken.iter().find(|(_, before)| *before == place) {
-            miette::bail!(
-                help = "give each output a name of its own",
-                "{option}: {} is the place of {other} too",
-                path.display()
-            );
+            let help = "give each output a name of its own";
+            miette::bail!(help = help, "{option}: {} is the place of {other} too", path.display());
         }
         replaceable(path, begins)?;
         taken.push((option, place));

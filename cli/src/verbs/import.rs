@@ -121,16 +121,12 @@ pub fn run(args: Args, json: bool) -> miette::Result<ExitCode> {
     }
     log.notes.iter().for_each(|note| say!("note: {note}"));
     log.assumed.iter().for_each(|what| say!("assumed in rig.toml: {what}"));
-    if let Some(series) = &log.series {
-        let t = series;
+    if let Some(cut) = &log.series {
+        let (samples, in_passes, reversals) = (cut.samples, cut.in_passes, cut.reversals);
+        let (changing, settling, too_short) = (cut.changing, cut.settling, cut.too_short);
         say!(
-            "of {} samples {} are in passes; left out: {} of changing speed, load or vibration, {} at beginnings, {} in short stretches; {} reversals",
-            t.samples,
-            t.in_passes,
-            t.changing,
-            t.settling,
-            t.too_short,
-            t.reversals
+            "of {samples} samples {in_passes} are in passes; left out: {changing} of changing speed, load or vibration, \
+             {settling} at beginnings, {too_short} in short stretches; {reversals} reversals"
         );
     }
     if !log.dropped.is_empty() {

@@ -62,7 +62,7 @@ pub fn run(args: Args, json: bool) -> miette::Result<ExitCode> {
     exit(DONE)
 }
 
-/// Moves the whole record to its place. The original keeps a name at every instant: it is linked beside first.
+/// Moves the whole record to its place. The original has a name at every instant: it is linked beside first.
 fn put_in_place(file: &Path, part: &Path) -> miette::Result<PathBuf> {
     let mut original = file.with_extension("mcap.original");
     let mut n = 1;

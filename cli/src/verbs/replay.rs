@@ -87,10 +87,8 @@ fn again(path: PathBuf) -> miette::Result<Found> {
         .collect();
     let Some((_, built)) = files.iter().find(|f| f.0 == REPLAYABLE) else {
         let found = inspect(BufReader::new(File::open(&path).into_diagnostic()?)).sentences().join("; ");
-        miette::bail!(
-            help = "give a run's folder, or its run-1.mcap",
-            "{shown} is not a recording of a run: it holds no {REPLAYABLE} ({found})"
-        );
+        let help = "give a run's folder, or its run-1.mcap";
+        miette::bail!(help = help, "{shown} is not a recording of a run: it holds no {REPLAYABLE} ({found})");
     };
     let built: Replayable = serde_json::from_slice(built)
         .into_diagnostic()

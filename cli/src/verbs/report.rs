@@ -22,11 +22,8 @@ pub fn run(args: Args, json: bool) -> miette::Result<ExitCode> {
     super::there(&args.run, "run")?;
     if args.run.join(runs::campaign::FILE).is_file() {
         if !args.overlay.is_empty() {
-            miette::bail!(
-                help = "give the folder of one of its runs",
-                "--overlay: {} is a campaign",
-                args.run.display()
-            );
+            let help = "give the folder of one of its runs";
+            miette::bail!(help = help, "--overlay: {} is a campaign", args.run.display());
         }
         let (claims, made, planned) = super::run::campaign::write(&args.run)?;
         if json {

@@ -181,10 +181,8 @@ fn measure(job: Job, planned: usize, args: &Args, json: bool) -> miette::Result<
 fn keys_are_free(job: &Job, tui: bool) -> miette::Result<()> {
     if job.setup.hand_at_key() {
         if job.fast {
-            miette::bail!(
-                help = "leave out --fast",
-                "the dead-man key is held in wall-clock time: no hand is that fast"
-            );
+            let help = "leave out --fast";
+            miette::bail!(help = help, "the dead-man key is held in wall-clock time: no hand is that fast");
         }
         say!(
             "dead-man key: release it, then hold the space bar down to arm and to continue. Release it, or press any other \

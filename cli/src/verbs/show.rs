@@ -42,10 +42,8 @@ pub fn run(args: &Args, json: bool) -> miette::Result<ExitCode> {
             .for_each(|b| out!("{}", folded(&format!("{:<10} {:<26} {}", b.kind, b.name, b.about()), 38))),
         (Some(name), _) => {
             let Some(found) = all.iter().find(|b| b.name == name) else {
-                miette::bail!(
-                    help = "`muprime show` lists what there is",
-                    "nothing that is bundled is called '{name}'"
-                );
+                let help = "`muprime show` lists what there is";
+                miette::bail!(help = help, "nothing that is bundled is called '{name}'");
             };
             let document = json!({ "kind": found.kind, "name": found.name, "text": found.text });
             return answered(json, &document, found.text.trim_end());

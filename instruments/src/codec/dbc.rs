@@ -194,7 +194,7 @@ fn one(dbc: &can_dbc::Dbc, message: &can_dbc::Message, begins: &Beginning) -> Db
     let mut signals = HashMap::new();
     let line =
         |name: &str| begins.signals.iter().find(|(_, n)| n == name).map_or(begins.line, |(line, _)| *line);
-    // Identifiers that differ only in what the reader cuts off would share what stands apart from the messages.
+    // Identifiers that differ only in what the reader cuts off would share what is apart from the messages.
     let alike = dbc.messages.iter().filter(|other| other.id == message.id).count();
     let apart = dbc.extended_multiplex.iter().any(|one| one.message_id == message.id)
         || dbc.signal_extended_value_type_list.iter().any(|one| one.message_id == message.id);

@@ -127,9 +127,8 @@ impl Compiler<'_> {
         for (first, cob, length) in sent.chain(taken) {
             let (_, mapped) = eds::mapping(&sheet, first, cob).map_err(|why| error(&why))?;
             if mapped != length {
-                return Err(error(&format!(
-                    "the frame {cob:#x} has {mapped} bytes, the profile says {length}"
-                )));
+                let why = format!("the frame {cob:#x} has {mapped} bytes, the profile says {length}");
+                return Err(error(&why));
             }
         }
         Ok(sheet)
@@ -531,9 +530,8 @@ impl Compiler<'_> {
     ) -> Result<(), ProfileError> {
         let (name, end) = (named.as_ref(), field.end());
         if end > frame_bytes {
-            return Err(
-                self.at_name(named, format!("`{name}` ends at byte {end} of a frame of {frame_bytes}"))
-            );
+            let why = format!("`{name}` ends at byte {end} of a frame of {frame_bytes}");
+            return Err(self.at_name(named, why));
         }
         if bit && field.number.bytes() > 2 {
             return Err(self.at_name(named, format!("`{name}` is a bit of its table: its type is `u16`")));

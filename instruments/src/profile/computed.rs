@@ -91,20 +91,18 @@ impl Profile {
         let mut at = known.0.clone();
         inputs.iter().for_each(|&input| at[input] = 0.0);
         // A row for each computed signal: its coefficients and what they must come to.
-        let mut rows: Vec<Vec<f64>> = computed
-            .iter()
-            .map(|&(index, value)| {
-                let signal = &self.signals[index];
-                let zero = value.value(&at);
-                let wanted = (unit_value(SignalId(index)) - signal.offset) / signal.scale - zero;
-                let slope = |&input: &usize| {
-                    let mut there = at.clone();
-                    there[input] = 1.0;
-                    value.value(&there) - zero
-                };
-                inputs.iter().map(slope).chain([wanted]).collect()
-            })
-            .collect();
+        let row = |&(index, value): &(usize, &Expression)| {
+            let signal = &self.signals[index];
+            let zero = value.value(&at);
+            let wanted = (unit_value(SignalId(index)) - signal.offset) / signal.scale - zero;
+            let slope = |&input: &usize| {
+                let mut there = at.clone();
+                there[input] = 1.0;
+                value.value(&there) - zero
+            };
+            inputs.iter().map(slope).chain([wanted]).collect()
+        };
+        let mut rows: Vec<Vec<f64>> = computed.iter().map(row).collect();
         solve(&mut rows)?;
         Some(inputs.into_iter().zip(rows).map(|(input, row)| (SignalId(input), row[n])).collect())
     }

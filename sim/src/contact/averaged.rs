@@ -48,12 +48,8 @@ fn variables(contact: &Contact) -> [f64; SLOPES] {
 }
 
 fn with(contact: &Contact, ln: [f64; SLOPES]) -> Contact {
-    let mut out = *contact;
-    out.sine_amplitude_m = ln[0].exp();
-    out.speed_m_s = ln[1].exp();
-    out.normal_force_n = ln[2].exp();
-    out.friction = ln[3].exp();
-    out
+    let [sine_amplitude_m, speed_m_s, normal_force_n, friction] = ln.map(f64::exp);
+    Contact { sine_amplitude_m, speed_m_s, normal_force_n, friction, ..*contact }
 }
 
 fn share(contact: &Contact) -> [f64; 2] {

@@ -58,12 +58,11 @@ impl Bench {
     pub(super) fn draw(noise: &mut Noise, seed: u64) -> Self {
         let normal = noise.log_between(0.8e6, 4e6);
         let poisson_ratio = noise.between(0.3, 0.49);
+        let lateral = normal / (2.0 * (1.0 + poisson_ratio)) * noise.between(0.9, 1.1);
         let round = |x: f64| (x / 1e4).round() * 1e4;
         let config = FingerConfig {
             normal_stiffness_n_per_m: round(normal),
-            lateral_stiffness_n_per_m: round(
-                normal / (2.0 * (1.0 + poisson_ratio)) * noise.between(0.9, 1.1),
-            ),
+            lateral_stiffness_n_per_m: round(lateral),
             stiffness_relative_sd: [0.03, 0.05, 0.1][noise.below(3)],
             mu0: noise.log_between(0.3, 1.0),
             poisson_ratio: (poisson_ratio * 100.0).round() / 100.0,
@@ -90,28 +89,22 @@ impl Bench {
 
     /// The true circumstances of planned passes.
     pub(super) fn circumstances(&self, planned: &[Planned], unsteady: bool, noise: &mut Noise) -> Vec<Point> {
-        planned
-            .iter()
-            .map(|p| {
-                let c = &p.condition;
-                let wander = if unsteady { self.scatter.load_relative_sd * noise.normal() } else { 0.0 };
-                Point {
-                    at: Surroundings {
-                        time_s: c.time_s,
-                        contact_time_s: c.time_s,
-                        position_m: c.position_m,
-                        direction: c.direction.sign(),
-                        frequency_hz: c.frequency_hz,
-                        normal_force_n: c.normal_force_n * (1.0 + wander),
-                        ambient_pressure_pa: c.ambient_pressure_pa.unwrap_or(101_325.0),
-                        temperature_c: 22.0
-                            + self.warming_k * (1.0 - (-c.time_s / self.warming_time_s).exp()),
-                    },
-                    known_pp_m: c.amplitude.metres(),
-                    speed_m_s: c.speed_m_s,
-                }
-            })
-            .collect()
+        let point = |p: &Planned| {
+            let c = &p.condition;
+            let wander = if unsteady { self.scatter.load_relative_sd * noise.normal() } else { 0.0 };
+            let at = Surroundings {
+                time_s: c.time_s,
+                contact_time_s: c.time_s,
+                position_m: c.position_m,
+                direction: c.direction.sign(),
+                frequency_hz: c.frequency_hz,
+                normal_force_n: c.normal_force_n * (1.0 + wander),
+                ambient_pressure_pa: c.ambient_pressure_pa.unwrap_or(101_325.0),
+                temperature_c: 22.0 + self.warming_k * (1.0 - (-c.time_s / self.warming_time_s).exp()),
+            };
+            Point { at, known_pp_m: c.amplitude.metres(), speed_m_s: c.speed_m_s }
+        };
+        planned.iter().map(point).collect()
     }
 
     /// What the sensor would show without noise.
@@ -191,26 +184,22 @@ impl Bench {
         let s = self.scatter;
         let counts = |x: f64| (x / s.count_n).round() * s.count_n;
         let with_samples = noise.chance(0.5);
-        points
-            .iter()
-            .zip(planned)
-            .enumerate()
-            .map(|(i, (point, plan))| {
-                let forces = steady_forces(&self.finger, defects, point);
-                let repeat = 1.0 + s.pass_relative_sd * self.scattered(noise);
-                let lateral = forces.lateral_n * repeat + s.force_sd_n * self.scattered(noise);
-                let normal = forces.normal_n + s.force_sd_n * self.scattered(noise);
-                let mut pass = self.row(i, plan, point, counts(normal));
-                pass.lateral_force_n = Some(counts(lateral));
-                if with_samples {
-                    pass.samples = Some(500);
-                    pass.normal_force_sd_n = Some(normal.abs() * s.load_relative_sd);
-                    pass.lateral_force_sd_n = Some((lateral.abs() * s.load_relative_sd).hypot(2e-3));
-                }
-                pass
-            })
-            .filter(|pass| pass.normal_force_n > 0.0)
-            .collect()
+        let pass = |(i, (point, plan)): (usize, (&Point, &Planned))| {
+            let forces = steady_forces(&self.finger, defects, point);
+            let repeat = 1.0 + s.pass_relative_sd * self.scattered(noise);
+            let lateral = forces.lateral_n * repeat + s.force_sd_n * self.scattered(noise);
+            let normal = forces.normal_n + s.force_sd_n * self.scattered(noise);
+            let mut pass = self.row(i, plan, point, counts(normal));
+            pass.lateral_force_n = Some(counts(lateral));
+            if with_samples {
+                pass.samples = Some(500);
+                pass.normal_force_sd_n = Some(normal.abs() * s.load_relative_sd);
+                pass.lateral_force_sd_n = Some((lateral.abs() * s.load_relative_sd).hypot(2e-3));
+            }
+            pass
+        };
+        let passes = points.iter().zip(planned).enumerate().map(pass);
+        passes.filter(|pass| pass.normal_force_n > 0.0).collect()
     }
 
     pub(super) fn row(&self, i: usize, plan: &Planned, point: &Point, normal_n: f64) -> Pass {

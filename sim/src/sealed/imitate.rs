@@ -158,15 +158,11 @@ impl Case<'_> {
             let instead_of = truth.iter().map(|d| d.kind.name.to_string()).collect();
             Imitator { name, instead_of, chi2_left, share_left: chi2_left / gap, form_left }
         };
-        let mut out: Vec<Imitator> = ALL
-            .iter()
-            .copied()
-            .filter(|kind| {
-                kind.in_library && kind.in_tables && (truth.len() > 1 || kind.name != truth[0].kind.name)
-            })
-            .filter(|kind| self.beside.iter().all(|d| d.kind.name != kind.name && compatible(d.kind, kind)))
-            .map(one)
-            .collect();
+        let known = ALL.iter().copied().filter(|kind| kind.in_library && kind.in_tables);
+        let other = |kind: &Kind| truth.len() > 1 || kind.name != truth[0].kind.name;
+        let goes_with = |kind: Kind, d: &Defect| d.kind.name != kind.name && compatible(d.kind, kind);
+        let free = |kind: &Kind| self.beside.iter().all(|d| goes_with(kind, d));
+        let mut out: Vec<Imitator> = known.filter(other).filter(free).map(one).collect();
         out.sort_by(|a, b| a.chi2_left.total_cmp(&b.chi2_left));
         out
     }

@@ -99,11 +99,8 @@ impl Job {
         let file = runs::files::open_plain(&path, std::fs::OpenOptions::new().read(true));
         let file = file.into_diagnostic().wrap_err_with(shown)?;
         if !runs::files::is_own(&file.metadata().into_diagnostic()?) {
-            miette::bail!(
-                help = "whoever handed it over follows and cancels it",
-                "{}: another user's job",
-                shown()
-            );
+            let help = "whoever handed it over follows and cancels it";
+            miette::bail!(help = help, "{}: another user's job", shown());
         }
         let bytes = std::io::read_to_string(file).into_diagnostic().wrap_err_with(shown)?;
         serde_json::from_str(&bytes).into_diagnostic().wrap_err_with(|| path.display().to_string())

@@ -85,11 +85,8 @@ pub fn gather(study: &Study, to: &Path, any_build: bool) -> miette::Result<Gathe
         let mut named: Vec<String> =
             holes.iter().take(NAMED).map(|h| format!("{}..{}", h.start, h.end)).collect();
         named.extend((holes.len() > NAMED).then(|| format!("and {} more", holes.len() - NAMED)));
-        miette::bail!(
-            help = "`muprime submit` with the same folder runs what is missing",
-            "{missing} of {cases} cases have no result: {}",
-            named.join(", ")
-        );
+        let help = "`muprime submit` with the same folder runs what is missing";
+        miette::bail!(help = help, "{missing} of {cases} cases have no result: {}", named.join(", "));
     }
     if let Some(beyond) = there.iter().find(|r| r.end > cases) {
         miette::bail!("{}: the study has {cases} cases only", study.shard(beyond).display());

@@ -32,13 +32,12 @@ pub type Facts = BTreeMap<String, String>;
 /// The schema of a kind's results.
 pub fn schema(kind: &CaseKind) -> Arc<Schema> {
     let description = |words: &str| HashMap::from([("description".to_string(), words.to_string())]);
+    let field =
+        |name, data, words| Field::new(name, data, name == "failed").with_metadata(description(words));
     let mut fields = vec![
-        Field::new("index", DataType::UInt64, false)
-            .with_metadata(description("index of the case in its file, from 0")),
-        Field::new("key", DataType::FixedSizeBinary(32), false)
-            .with_metadata(description("SHA-256 of version and inputs of the case")),
-        Field::new("failed", DataType::Utf8, true)
-            .with_metadata(description("why there is no result; missing where there is one")),
+        field("index", DataType::UInt64, "index of the case in its file, from 0"),
+        field("key", DataType::FixedSizeBinary(32), "SHA-256 of version and inputs of the case"),
+        field("failed", DataType::Utf8, "why there is no result; missing where there is one"),
     ];
     for column in kind.columns {
         let (data, unit) = match column.cells {

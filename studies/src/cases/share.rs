@@ -27,10 +27,8 @@ impl Share {
     /// A task beyond the last one.
     pub fn new(task: u64, of: u64) -> miette::Result<Share> {
         if task >= of {
-            bail!(
-                help = "tasks count from 0: an array of 8 is 0-7, with --of 8",
-                "task {task} of {of}: there is no such task"
-            );
+            let help = "tasks count from 0: an array of 8 is 0-7, with --of 8";
+            bail!(help = help, "task {task} of {of}: there is no such task");
         }
         Ok(Share { task, of })
     }
@@ -59,21 +57,16 @@ impl Share {
             }
         }
         let (name, task) = found.ok_or_else(|| {
-            miette!(
-                help = "give --range FIRST..END, --index N or --task I --of N",
-                "no cases are named, and none of {} is set",
-                NUMBERS.join(", ")
-            )
+            let help = "give --range FIRST..END, --index N or --task I --of N";
+            miette!(help = help, "no cases are named, and none of {} is set", NUMBERS.join(", "))
         })?;
         if let Some(of) = of {
             return Share::new(task, of);
         }
         let (least, most) = (number("SLURM_ARRAY_TASK_MIN")?, number("SLURM_ARRAY_TASK_MAX")?);
         let (Some(least), Some(most), Some(count)) = (least, most, number("SLURM_ARRAY_TASK_COUNT")?) else {
-            bail!(
-                help = "give the number of tasks: --of N",
-                "{name} is {task}, and nothing states of how many tasks"
-            );
+            let help = "give the number of tasks: --of N";
+            bail!(help = help, "{name} is {task}, and nothing states of how many tasks");
         };
         let step = number("SLURM_ARRAY_TASK_STEP")?.unwrap_or(1).max(1);
         let past = task.wrapping_sub(least);

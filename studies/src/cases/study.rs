@@ -55,13 +55,9 @@ impl Study {
         let file = CaseFile::open(cases)?;
         let kind = kinds::by_name(&file.header.kind)?;
         if file.header.version != kind.version() {
-            miette::bail!(
-                help = "write the cases again with this version, and let it run them all",
-                "{}: cases of '{}', and this is '{}'",
-                cases.display(),
-                file.header.version,
-                kind.version()
-            );
+            let (of, this) = (&file.header.version, kind.version());
+            let help = "write the cases again with this version, and let it run them all";
+            miette::bail!(help = help, "{}: cases of '{of}', and this is '{this}'", cases.display());
         }
         let folder = file.path.parent().unwrap_or(Path::new("/")).to_path_buf();
         let make = (kind.prepare)(&file.header, &folder).wrap_err_with(|| cases.display().to_string())?;
@@ -124,14 +120,12 @@ impl Study {
         if (there.schema.as_str(), &there.header) == (SCHEMA, &self.file.digest) {
             return Ok(());
         }
+        let other = format!("{} ({})", there.cases.display(), there.version);
+        let own = format!("{} ({})", self.file.path.display(), self.kind.version());
         miette::bail!(
             help = "give another folder: results of two studies do not mix",
-            "{} holds the study of {} ({}), whose first line is another than that of {} ({})",
-            self.out.display(),
-            there.cases.display(),
-            there.version,
-            self.file.path.display(),
-            self.kind.version()
+            "{} holds the study of {other}, whose first line is another than that of {own}",
+            self.out.display()
         )
     }
 

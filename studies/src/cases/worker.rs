@@ -84,13 +84,10 @@ fn stands(study: &Study, range: &Range<u64>, place: &Path) -> miette::Result<boo
     if reader.facts.get("keys").is_some_and(|there| *there == hex(&keys.finalize())) {
         return Ok(true);
     }
-    miette::bail!(
-        help =
-            "the cases or what they name were changed after it was made: remove it, or give another folder",
-        "{} is of other cases than those of {}",
-        place.display(),
-        study.file.path.display()
-    )
+    let (place, cases) = (place.display(), study.file.path.display());
+    let help =
+        "the cases or what they name were changed after it was made: remove it, or give another folder";
+    miette::bail!(help = help, "{place} is of other cases than those of {cases}")
 }
 
 /// Runs the cases in portions and writes them; `None` where the study was cancelled meanwhile.

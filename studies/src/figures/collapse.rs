@@ -89,19 +89,17 @@ pub fn collapse(study: Study, out: &Path) -> miette::Result<Reproduced> {
     series.push(law(refit, fit.psi_star, fit.psi_star_sd));
     let stated = format!("\u{3a8}* {PSI_STAR} \u{b1} {PSI_STAR_UNCERTAINTY} (paper)");
     series.push(law(stated, PSI_STAR, PSI_STAR_UNCERTAINTY));
+    let part =
+        |of: &str, psi_fit::PsiFit { psi_star, psi_star_sd: sd, rmse, points, .. }: &psi_fit::PsiFit| {
+            format!("{of}: Psi* = {psi_star:.2} +- {sd:.2}, rmse {rmse:.3}, {points} points")
+        };
     let mut lines = vec![
         format!(
             "refit on the paper's choice of data: Psi* = {:.2} +- {:.2} (jackknife over curves), rmse {:.3}, {} points; paper: {PSI_STAR} +- {PSI_STAR_UNCERTAINTY}",
             fit.psi_star, fit.psi_star_sd, fit.rmse, fit.points
         ),
-        format!(
-            "on the amplitudes of its caption alone: Psi* = {:.2} +- {:.2}, rmse {:.3}, {} points",
-            caption.psi_star, caption.psi_star_sd, caption.rmse, caption.points
-        ),
-        format!(
-            "where contact is lost for 30 % of the time or more: Psi* = {:.2} +- {:.2}, rmse {:.3}, {} points",
-            open.psi_star, open.psi_star_sd, open.rmse, open.points
-        ),
+        part("on the amplitudes of its caption alone", &caption),
+        part("where contact is lost for 30 % of the time or more", &open),
     ];
     for panel in Panel::ALL {
         let local = (0..4).map(|value| {

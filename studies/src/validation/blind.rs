@@ -328,6 +328,7 @@ pub fn figures(all: &[Scored]) -> Vec<Figure> {
             names == s.truth
         })
     };
+    let both_lead = |s: &Scored| s.top_right;
     let any_of = |s: &Scored| s.named.iter().any(|n| s.truth.contains(n));
     let log: Vec<f64> = clear.iter().map(|s| s.probability_of_truth.max(1e-6).ln()).collect();
     let probability: Vec<f64> = clear.iter().map(|s| s.probability_of_truth).collect();
@@ -365,13 +366,9 @@ pub fn figures(all: &[Scored]) -> Vec<Figure> {
         share("undecidable: truth in the stated class", ">= 0.90", of(&murky, &in_class)),
         share("  named exactly right", "reported", of(&murky, &named_right)),
         share("  confidently wrong", "<= 0.03", of(&murky, &named_wrong)),
-        share(
-            "pairs, decidable, best single leaves 25 %: both lead",
-            ">= 0.80",
-            of(&pairs, &|s| s.top_right),
-        ),
+        share("pairs, decidable, best single leaves 25 %: both lead", ">= 0.80", of(&pairs, &both_lead)),
         share("  at least one leads", ">= 0.97", of(&pairs, &any_of)),
-        share("  an undecidable member: both lead", "reported", of(&murky_pairs, &|s| s.top_right)),
+        share("  an undecidable member: both lead", "reported", of(&murky_pairs, &both_lead)),
         share("  an undecidable member: truth in the stated class", "reported", of(&murky_pairs, &in_class)),
         statistic("gap closed by the named form alone, median", ">= 0.75", &closed, median),
         statistic("gap closed by the verdict's model, median", "reported", &closed_full, median),

@@ -21,11 +21,8 @@ const CONFORMS: &str = "https://w3id.org/ro/crate/1.3";
 /// No licence or a text that is none, another place, a run without its date, or a file that cannot be read.
 pub fn bytes(folder: &Path, run: &RunData, facts: &Facts, place: &Path) -> miette::Result<Vec<u8>> {
     if place != folder.join(FILE) {
-        miette::bail!(
-            help = "leave --out away, and copy the folder afterwards",
-            "an RO-Crate is described by {FILE} in the folder itself, not by {}",
-            place.display()
-        );
+        let (help, place) = ("leave --out away, and copy the folder afterwards", place.display());
+        miette::bail!(help = help, "an RO-Crate is described by {FILE} in the folder itself, not by {place}");
     }
     let Some(licence) = facts.get("licence") else {
         miette::bail!(

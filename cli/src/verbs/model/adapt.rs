@@ -108,12 +108,11 @@ pub fn run(args: &AdaptArgs, json: bool) -> miette::Result<ExitCode> {
             places.iter().zip(&held_out).filter_map(|(p, mu)| Some(grid.at(p) - (*mu)?)).collect();
         rms = (errors.iter().map(|e| e * e).sum::<f64>() / errors.len().max(1) as f64).sqrt();
         let worst = errors.iter().fold(0.0_f64, |a, e| a.max(e.abs()));
-        say!(
-            "{name}: {} nodes, on {} held-out cases rms {rms:.4}, worst {worst:.4}",
-            grid.nodes.len(),
-            errors.len()
-        );
-        rounds.push(json!({ "nodes": grid.nodes.len(), "failed": failed, "held_out": errors.len(), "rms": rms, "worst": worst }));
+        let (nodes, held_out) = (grid.nodes.len(), errors.len());
+        say!("{name}: {nodes} nodes, on {held_out} held-out cases rms {rms:.4}, worst {worst:.4}");
+        let round =
+            json!({ "nodes": nodes, "failed": failed, "held_out": held_out, "rms": rms, "worst": worst });
+        rounds.push(round);
     }
     let surrogate = args.out.join("surrogate.json");
     let document = json!({

@@ -83,29 +83,18 @@ impl ConditionArgs {
 
     /// As the point models take it.
     pub fn condition(&self) -> Condition {
-        Condition {
-            amplitude: PeakToPeak::from_metres(self.amplitude_pp_m),
-            frequency_hz: self.frequency_hz,
-            speed_m_s: self.speed_m_s,
-            normal_force_n: self.normal_force_n,
-            mu0: self.mu0,
-            ..Condition::paper()
-        }
+        let ConditionArgs { amplitude_pp_m, frequency_hz, speed_m_s, normal_force_n, mu0, .. } = *self;
+        let amplitude = PeakToPeak::from_metres(amplitude_pp_m);
+        Condition { amplitude, frequency_hz, speed_m_s, normal_force_n, mu0, ..Condition::paper() }
     }
 
     /// As the ridge takes it, with the mean pressure of the force unless given.
     pub fn ridge_case(&self, mean_pressure_pa: Option<f64>) -> RidgeCase {
-        RidgeCase {
-            amplitude: PeakToPeak::from_metres(self.amplitude_pp_m),
-            frequency_hz: self.frequency_hz,
-            speed_m_s: self.speed_m_s,
-            normal_force_n: self.normal_force_n,
-            mu0: self.mu0,
-            poisson_ratio: self.poisson_ratio,
-            mean_pressure_pa: mean_pressure_pa
-                .unwrap_or_else(|| case::hertz_mean_pressure_pa(self.normal_force_n)),
-            ..RidgeCase::paper()
-        }
+        let Condition { amplitude, frequency_hz, speed_m_s, normal_force_n, mu0, .. } = self.condition();
+        let hertz = || case::hertz_mean_pressure_pa(normal_force_n);
+        let (poisson_ratio, mean_pressure_pa) = (self.poisson_ratio, mean_pressure_pa.unwrap_or_else(hertz));
+        let paper = RidgeCase { poisson_ratio, mean_pressure_pa, ..RidgeCase::paper() };
+        RidgeCase { amplitude, frequency_hz, speed_m_s, normal_force_n, mu0, ..paper }
     }
 }
 

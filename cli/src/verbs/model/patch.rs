@@ -43,16 +43,13 @@ fn rows(args: &PatchArgs) -> Result<Vec<(&'static str, Option<PsiFit>)>, RidgeEr
 pub fn run(args: &PatchArgs, json: bool) -> miette::Result<ExitCode> {
     let rows = rows(args).map_err(refused)?;
     if json {
-        let document: Vec<serde_json::Value> = rows
-            .iter()
-            .map(|(what, fit)| {
-                json!({
-                    "what": what, "psi_star": fit.map(|f| f.psi_star), "psi_star_sd": fit.map(|f| f.psi_star_sd),
-                    "rmse": fit.map(|f| f.rmse), "points": fit.map_or(0, |f| f.points),
-                })
+        let row = |(what, fit): &(&str, Option<PsiFit>)| {
+            json!({
+                "what": what, "psi_star": fit.map(|f| f.psi_star), "psi_star_sd": fit.map(|f| f.psi_star_sd),
+                "rmse": fit.map(|f| f.rmse), "points": fit.map_or(0, |f| f.points),
             })
-            .collect();
-        answer_json(&document);
+        };
+        answer_json(&rows.iter().map(row).collect::<Vec<_>>());
         return Ok(ExitCode::SUCCESS);
     }
     for (what, fit) in rows {

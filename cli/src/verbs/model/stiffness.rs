@@ -168,16 +168,13 @@ pub fn run(args: &StiffnessArgs, json: bool) -> miette::Result<ExitCode> {
         }
         out!("                          k_l/k_n  at 3 F           Psi*  rmse slider's Eq. 16");
         for r in rows {
+            let Surveyed { what, lateral_over_normal, lateral_over_normal_at_3_loads: at_3, .. } = r;
             let number = |v: Option<f64>| v.map_or("none".into(), |v| format!("{v:.2}"));
+            let fitted = format!("{} +- {}", number(r.psi_star), number(r.psi_star_sd));
+            let rmse = r.rmse.map_or("none".into(), |v| format!("{v:.3}"));
+            let [slider, eq16] = [r.slider_psi_star, r.psi_star_eq16].map(number);
             out!(
-                "{:<25} {:>7.3} {:>7.3} {:>14} {:>5} {:>8} {:>6}",
-                r.what,
-                r.lateral_over_normal,
-                r.lateral_over_normal_at_3_loads,
-                format!("{} +- {}", number(r.psi_star), number(r.psi_star_sd)),
-                r.rmse.map_or("none".into(), |v| format!("{v:.3}")),
-                number(r.slider_psi_star),
-                number(r.psi_star_eq16)
+                "{what:<25} {lateral_over_normal:>7.3} {at_3:>7.3} {fitted:>14} {rmse:>5} {slider:>8} {eq16:>6}"
             );
         }
         return Ok(ExitCode::SUCCESS);
@@ -206,15 +203,12 @@ pub fn run(args: &StiffnessArgs, json: bool) -> miette::Result<ExitCode> {
             HeldAt::DermisBase => "dermis",
             HeldAt::Top => "top",
         };
+        let StaticStiffness { normal_pa, normal_secant_pa, lateral_pa, lateral_over_normal, .. } = r.found;
+        let [normal, secant, lateral] = [normal_pa, normal_secant_pa, lateral_pa].map(|pa| finger * pa);
+        let (what, load, width) = (r.what, r.load_over_mean, 1e6 * r.found.contact_width_m);
         out!(
-            "{:<25} {held:<7} {:>4} {:>8.1} {:>7.3} {:>7.3} {:>7.3} {:>8.3}",
-            r.what,
-            r.load_over_mean,
-            1e6 * r.found.contact_width_m,
-            finger * r.found.normal_pa,
-            finger * r.found.normal_secant_pa,
-            finger * r.found.lateral_pa,
-            r.found.lateral_over_normal
+            "{what:<25} {held:<7} {load:>4} {width:>8.1} {normal:>7.3} {secant:>7.3} {lateral:>7.3} \
+             {lateral_over_normal:>8.3}"
         );
     }
     Ok(ExitCode::SUCCESS)

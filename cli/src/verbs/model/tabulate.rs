@@ -3,7 +3,7 @@
 use crate::verbs::prelude::*;
 use clap::Args;
 use models::law_table::ANSWERS;
-use models::law_table::grid::Grid;
+use models::law_table::grid::{Grid, Tabulated};
 use std::io::Write;
 use std::process::{Command, Stdio};
 
@@ -39,29 +39,21 @@ pub fn run(args: &TabulateArgs, json: bool) -> miette::Result<ExitCode> {
     let grid = Grid::parse(args.grid.iter().map(String::as_str)).map_err(|e| miette::miette!("{e}"))?;
     let answers = answers(&args.command, &conditions(&grid, args.checks))?;
     let made = grid.table(args.checks, &answers).map_err(|e| {
-        miette::miette!(
-            help = "correct the program, or choose a grid within its domain",
-            "{}: {e}",
-            args.command
-        )
+        let help = "correct the program, or choose a grid within its domain";
+        miette::miette!(help = help, "{}: {e}", args.command)
     })?;
     let tolerance = if args.accept_error { f64::INFINITY } else { args.tolerance };
     let origin = format!("command {}", args.command);
     let (text, sha256) = tables::law::file_of(&made, &origin, tolerance)?;
     runs::files::write_output(&args.out, text)?;
-    let rows = answers.len() - made.checks;
+    let Tabulated { checks, greatest, place, rms, .. } = &made;
+    let rows = answers.len() - checks;
     let document = json!({
-        "file": args.out, "rows": rows, "sha256": sha256, "checks": made.checks,
-        "error_greatest": made.greatest, "error_greatest_at": made.place, "error_rms": made.rms,
+        "file": args.out, "rows": rows, "sha256": sha256, "checks": checks,
+        "error_greatest": greatest, "error_greatest_at": place, "error_rms": rms,
     });
-    let words = format!(
-        "{}: {rows} rows; against {} fresh calls mu' differs by {:.4} at most (at {}), rms {:.4}",
-        args.out.display(),
-        made.checks,
-        made.greatest,
-        made.place,
-        made.rms
-    );
+    let differs = format!("mu' differs by {greatest:.4} at most (at {place}), rms {rms:.4}");
+    let words = format!("{}: {rows} rows; against {checks} fresh calls {differs}", args.out.display());
     answered(json, &document, words)
 }
 
@@ -88,23 +80,16 @@ fn answers(command: &str, conditions: &str) -> miette::Result<Vec<[f64; 2]>> {
     });
     let output = output.into_diagnostic().wrap_err_with(failed)?;
     if !output.status.success() {
-        miette::bail!(
-            help = "try it by hand on a CSV of conditions",
-            "{} failed: {}",
-            failed(),
-            output.status
-        );
+        let help = "try it by hand on a CSV of conditions";
+        miette::bail!(help = help, "{} failed: {}", failed(), output.status);
     }
     let mut reader = csv::ReaderBuilder::new().trim(csv::Trim::All).from_reader(&output.stdout[..]);
     let header = reader.headers().into_diagnostic().wrap_err_with(failed)?.clone();
     let [mu, sd] = ANSWERS.map(|(name, _)| header.iter().position(|h| h == name));
     let Some(mu) = mu else {
         let first = header.iter().collect::<Vec<_>>().join(",");
-        miette::bail!(
-            help = "its first line must be `mu_relative` or `mu_relative,mu_relative_sd`",
-            "{} wrote the header '{first}'",
-            failed()
-        );
+        let help = "its first line must be `mu_relative` or `mu_relative,mu_relative_sd`";
+        miette::bail!(help = help, "{} wrote the header '{first}'", failed());
     };
     let number =
         |row: &csv::StringRecord, k: usize| row.get(k).and_then(|t| t.parse().ok()).unwrap_or(f64::NAN);

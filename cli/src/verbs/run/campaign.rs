@@ -14,10 +14,8 @@ pub const PAGE: &str = "campaign.html";
 /// them.
 pub fn run(mut args: Args, text: &str, folder: &Path, json: bool) -> miette::Result<ExitCode> {
     if args.seed.is_some() {
-        miette::bail!(
-            help = "state `seed` in the campaign's file",
-            "--seed is that of one run; a campaign has its own"
-        );
+        let help = "state `seed` in the campaign's file";
+        miette::bail!(help = help, "--seed is that of one run; a campaign has its own");
     }
     let resumed = Path::new(&args.plan).is_dir().then(|| PathBuf::from(&args.plan));
     let file = resumed

@@ -28,7 +28,8 @@ fn again(folder: &Path, job: &Job) -> miette::Result<Handed> {
 /// Starts the script; its first line names the job, or what is wrong.
 fn begun(folder: &Path, job: &Job, ids: &[String]) -> miette::Result<Handed> {
     let mut options = std::fs::OpenOptions::new();
-    let log = files::open_plain(&folder.join("log.txt"), options.create(true).append(true));
+    let path = folder.join("log.txt");
+    let log = files::open_plain(&path, options.create(true).append(true));
     let log = log.into_diagnostic().wrap_err("log.txt")?;
     let mut child = Command::new(&job.python)
         // Nothing of the folder is run or trusted: the script is this program's, and the job comes by its standard input.
@@ -55,13 +56,9 @@ fn begun(folder: &Path, job: &Job, ids: &[String]) -> miette::Result<Handed> {
     let Some(ids) = named else {
         let _ = child.kill();
         let _ = child.wait();
-        let log = std::fs::read_to_string(folder.join("log.txt")).unwrap_or_default();
+        let log = std::fs::read_to_string(&path).unwrap_or_default();
         let last = log.lines().rev().find(|l| l.contains("Error")).unwrap_or("no output").to_string();
-        return Err(miette!(
-            "{} takes no tasks: {last} (all of it: {})",
-            job.engine,
-            folder.join("log.txt").display()
-        ));
+        return Err(miette!("{} takes no tasks: {last} (all of it: {})", job.engine, path.display()));
     };
     Ok(Handed { ids, child: Some(child), tasks: job.ranges.len() as u64, ..Handed::of(job) })
 }

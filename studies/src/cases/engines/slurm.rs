@@ -108,21 +108,16 @@ fn more(folder: &Path, job: &Job, handed: &mut Handed, mut queued: u64) -> miett
         let stderr = String::from_utf8_lossy(&output.stderr).into_owned();
         let why = stderr.split_whitespace().collect::<Vec<_>>().join(" ");
         handed.refusals += 1;
+        let refuses =
+            format!("sbatch refuses {count} tasks, with {} of {tasks} accepted: {why}", handed.tasks);
         if !PASSING.iter().any(|words| why.contains(words)) || (queued == 0 && handed.refusals > REFUSALS) {
-            return Err(miette!(
-                help = "tasks that were accepted go on; repeat the command for the others",
-                "sbatch refuses {count} tasks, with {} of {tasks} accepted: {why}",
-                handed.tasks
-            ));
+            let help = "tasks that were accepted go on; repeat the command for the others";
+            return Err(miette!(help = help, "{refuses}"));
         }
         handed.array = (count / 2).max(1);
         let pause = LONGEST_PAUSE.min(PAUSE * 2_u32.pow(handed.refusals.min(20) - 1));
         handed.pause_until = Some(Instant::now() + pause);
-        let accepted = handed.tasks;
-        say!(
-            "sbatch refuses {count} tasks, with {accepted} of {tasks} accepted: {why}; pause of {} s",
-            pause.as_secs()
-        );
+        say!("{refuses}; pause of {} s", pause.as_secs());
     }
     Ok(())
 }

@@ -61,22 +61,16 @@ impl Default for Settings {
 fn prepare(header: &Header, folder: &Path) -> miette::Result<super::Make> {
     let settings: Settings = super::settings(header)?;
     let rest = serde_json::to_string(&settings).unwrap_or_default();
+    let Settings { elements, modulus_only, modulus_range_pa } = settings;
     let folder = folder.to_path_buf();
     Ok(Box::new(move |index, given| {
-        let case: Line = line(index, given)?;
-        let path = folder.join(&case.phases);
+        let Line { phases, frequency_hz, normal_force_n } = line(index, given)?;
+        let path = folder.join(phases);
         let bytes = bytes_of(&path, MAX_TABLE_BYTES).wrap_err_with(|| format!("case {index}"))?;
-        let inputs =
-            format!("{} {:?} {:?} {rest}", sha256_hex(&bytes), case.frequency_hz, case.normal_force_n);
-        let [low, high] = settings.modulus_range_pa;
-        let options = Options {
-            frequency_hz: case.frequency_hz,
-            normal_force_n: case.normal_force_n,
-            modulus_range_pa: (low, high),
-            elements: settings.elements,
-            modulus_only: settings.modulus_only,
-            shown: false,
-        };
+        let inputs = format!("{} {frequency_hz:?} {normal_force_n:?} {rest}", sha256_hex(&bytes));
+        let (modulus_range_pa, shown) = (modulus_range_pa.into(), false);
+        let options =
+            Options { frequency_hz, normal_force_n, modulus_range_pa, elements, modulus_only, shown };
         let run = move || {
             let points = read_phases(bytes.as_slice()).map_err(|e| e.to_string())?;
             let (elastic, skin) = inverse::analyse(&options, &points).map_err(|why| why.to_string())?;

@@ -152,12 +152,9 @@ fn values(c: &RidgeCase) -> [f64; 10] {
 
 /// All that a run depends on.
 pub fn inputs_of(case: &RidgeCase, settings: &RunSettings) -> String {
-    let step = settings.step_s.map(f64::to_bits);
-    format!(
-        "{} {} {step:?}",
-        serde_json::to_string(case).unwrap_or_default(),
-        serde_json::to_string(&settings.steady).unwrap_or_default()
-    )
+    let case = serde_json::to_string(case).unwrap_or_default();
+    let steady = serde_json::to_string(&settings.steady).unwrap_or_default();
+    format!("{case} {steady} {:?}", settings.step_s.map(f64::to_bits))
 }
 
 /// The `n`th place of a low-discrepancy sequence (Kronecker's, with powers of the root of x^(d+1) = x + 1), from 1.
@@ -179,12 +176,10 @@ fn prepare(header: &Header, _: &std::path::Path) -> miette::Result<super::Make> 
     }
     base.check().into_diagnostic()?;
     base.geometry.mesh(base.materials(), base.elements).into_diagnostic()?;
-    for (name, span) in &settings.spans {
-        if !(span.low < span.high && (!span.log || span.low > 0.0)) {
+    for (name, &Span { low, high, log }) in &settings.spans {
+        if !(low < high && (!log || low > 0.0)) {
             miette::bail!(
-                "span of {name}: {} to {}: from a lower to a higher value, above 0 in the logarithm",
-                span.low,
-                span.high
+                "span of {name}: {low} to {high}: from a lower to a higher value, above 0 in the logarithm"
             );
         }
     }

@@ -111,30 +111,22 @@ pub fn run(
     options: &Options,
     progress: impl Fn(u64, &RoughSet, &Report, &Answers) + Sync,
 ) -> miette::Result<Vec<Answers>> {
-    truths
-        .iter()
-        .map(|truth| {
-            let kind = match *truth {
-                "none" => None,
-                cause => Some(
-                    DefectKind::named(cause).ok_or_else(|| miette::miette!("no cause is named '{cause}'"))?,
-                ),
-            };
-            let all: Vec<Answers> = (0..count as u64)
-                .into_par_iter()
-                .map(|k| {
-                    let own = seed.wrapping_mul(1_000_003).wrapping_add(k);
-                    let set = rough(own, kind, roughness);
-                    let report = answer(&set, options)?;
-                    let one = Answers::of(name, truth, &set, &report);
-                    progress(own, &set, &report, &one);
-                    Ok(one)
-                })
-                .collect::<miette::Result<_>>()?;
-            let none = Answers { noise: name.into(), truth: (*truth).into(), ..Answers::default() };
-            Ok(all.iter().fold(none, Answers::with))
-        })
-        .collect()
+    let of_truth = |truth: &&str| {
+        let named = || DefectKind::named(truth).ok_or_else(|| miette::miette!("no cause is named '{truth}'"));
+        let kind = (*truth != "none").then(named).transpose()?;
+        let one = |k: u64| {
+            let own = seed.wrapping_mul(1_000_003).wrapping_add(k);
+            let set = rough(own, kind, roughness);
+            let report = answer(&set, options)?;
+            let one = Answers::of(name, truth, &set, &report);
+            progress(own, &set, &report, &one);
+            Ok(one)
+        };
+        let all = (0..count as u64).into_par_iter().map(one).collect::<miette::Result<Vec<Answers>>>()?;
+        let none = Answers { noise: name.into(), truth: (*truth).into(), ..Answers::default() };
+        Ok(all.iter().fold(none, Answers::with))
+    };
+    truths.iter().map(of_truth).collect()
 }
 
 /// The report on one set.

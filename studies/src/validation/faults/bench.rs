@@ -442,8 +442,7 @@ impl Watch {
         if !self.armed {
             self.wrong.push("the rig would not arm".into());
         }
-        let mut shown_cycles = Vec::new();
-        let mut command_off = Vec::new();
+        let (mut shown_cycles, mut command_off) = (Vec::new(), Vec::new());
         let alone = scene.strikes.len() == 1;
         let timing = scene.pace.timing(T, RING);
         let mut may: Vec<Cause> = scene.strikes.iter().flat_map(|s| ROWS[s.row].causes).copied().collect();

@@ -126,9 +126,8 @@ const fn cycles(cycles: u64) -> Within {
 impl Within {
     /// In cycles, at that timing.
     pub fn at(&self, timing: &Timing) -> u64 {
-        let whole = |t: Nanos| t.0.div_ceil(timing.cycle.0);
-        let force_age = whole(timing.normal.age_limit());
-        let state_age = whole(timing.amplifier.age_limit());
+        let age = |of: &ChannelTiming| of.age_limit().0.div_ceil(timing.cycle.0);
+        let (force_age, state_age) = (age(&timing.normal), age(&timing.amplifier));
         let response = response(timing);
         let sum = self.cycles
             + self.force_ages * force_age

@@ -32,17 +32,15 @@ pub struct OtherStart {
 impl OtherStart {
     /// In a line.
     pub fn words(&self, run: &RidgeRun) -> String {
-        let doubled = |yes: bool| if yes { ", doubled" } else { "" };
-        format!(
-            "from rest: mu' {:.4}, contact {:.0} %{}; down from twice the amplitude: mu' {:.4}, contact {:.0} %{}: {}",
-            run.mu_relative,
-            100.0 * run.contact_fraction,
-            doubled(run.period_doubled),
-            self.mu_relative,
-            100.0 * self.contact_fraction,
-            doubled(self.period_doubled),
-            if self.depends_on_start { "TWO STATES, the answer depends on the start" } else { "one state" }
-        )
+        let state = |mu: f64, contact: f64, doubled: bool| {
+            let doubled = if doubled { ", doubled" } else { "" };
+            format!("mu' {mu:.4}, contact {:.0} %{doubled}", 100.0 * contact)
+        };
+        let rest = state(run.mu_relative, run.contact_fraction, run.period_doubled);
+        let above = state(self.mu_relative, self.contact_fraction, self.period_doubled);
+        let states =
+            if self.depends_on_start { "TWO STATES, the answer depends on the start" } else { "one state" };
+        format!("from rest: {rest}; down from twice the amplitude: {above}: {states}")
     }
 }
 
