@@ -127,7 +127,9 @@ mod tests {
     #[test]
     fn what_is_missing_is_named_with_its_remedy() {
         let folder = tempfile::tempdir().unwrap();
-        for (has, help) in [(POINTS, "take passes.jsonl from a copy"), (JOURNAL, "from passes.jsonl")] {
+        for (has, help) in
+            [(POINTS, "take passes.jsonl from a copy"), (JOURNAL, "the passes of passes.jsonl")]
+        {
             fs::write(folder.path().join(has), "").unwrap();
             let why = passes_in(folder.path()).unwrap_err();
             let remedy = why.help().unwrap().to_string();
