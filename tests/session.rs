@@ -173,6 +173,40 @@ fn a_lateral_sensor_that_is_reversed_is_named() {
     assert!(told.contains("axis is reversed"), "{told}");
 }
 
+/// A sensor whose zero is 60 mN off at loads of 250 mN: said at once, and kept in summary and report.
+#[test]
+fn a_zero_that_is_off_is_told_before_the_sweep_and_is_in_the_summary() {
+    let folder = tempfile::tempdir().unwrap();
+    let (plan, out, defects) =
+        (short_plan(folder.path()), folder.path().join("run"), folder.path().join("defects.toml"));
+    let off =
+        "[[defect]]\nname = \"normal_offset\"\nseed = 1\nparameters = { offset_n = 0.06, sinking = 0.2 }\n";
+    std::fs::write(&defects, off).unwrap();
+    let told = |out: &std::path::Path, more: &[&str]| {
+        let run = muprime()
+            .args(["run", &plan, "--fast", "--setup", "virtual-ideal", "--out"])
+            .arg(out)
+            .args(more)
+            .output();
+        let summary = std::fs::read(out.join("summary.json")).unwrap();
+        (texts(&run.unwrap()).1, serde_json::from_slice::<serde_json::Value>(&summary).unwrap())
+    };
+    let (terminal, summary) = told(&out, &["--defects", defects.to_str().unwrap()]);
+    let before = terminal.find("% of the smallest load: zero the sensor").expect("a warning");
+    assert!(before < terminal.find("after the sweep").unwrap(), "{terminal}");
+    for when in ["before", "after"] {
+        let zero = summary["zeros"][when]["normal_n"].as_f64().unwrap();
+        assert!((zero - 0.06).abs() < 0.005, "{when}: {zero}");
+    }
+    let remarks = summary["remarks"].to_string();
+    assert!(remarks.contains("the zero of the normal force was off by +"), "{remarks}");
+    assert!(
+        std::fs::read_to_string(out.join("report.html")).unwrap().contains("the zero of the normal force")
+    );
+    let (terminal, summary) = told(&folder.path().join("good"), &[]);
+    assert!(!terminal.contains("zero the sensor") && summary.get("remarks").is_none(), "{terminal}");
+}
+
 #[test]
 fn bad_input_is_refused_with_its_place_and_nothing_is_touched() {
     let folder = tempfile::tempdir().unwrap();

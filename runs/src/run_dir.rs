@@ -113,8 +113,8 @@ impl Identity {
 }
 
 /// What brings files of a run's folder back that were lost.
-pub const RUN_AGAIN: &str = "repeat the command of the run with the same --out: it writes summary.json again, rig.toml where it is missing, \
-     and the passes of passes.jsonl that points.csv lacks";
+pub const RUN_AGAIN: &str = "repeat the command of the run with the same --out: it writes summary.json again, \
+                             rig.toml where it is missing, and the passes of passes.jsonl that points.csv lacks";
 
 /// Setup and plan of a run: the file that makes a folder a run's.
 pub const IDENTITY: &str = "run.toml";

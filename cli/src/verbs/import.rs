@@ -125,8 +125,8 @@ pub fn run(args: Args, json: bool) -> miette::Result<ExitCode> {
         let (samples, in_passes, reversals) = (cut.samples, cut.in_passes, cut.reversals);
         let (changing, settling, too_short) = (cut.changing, cut.settling, cut.too_short);
         say!(
-            "of {samples} samples {in_passes} are in passes; left out: {changing} of changing speed, load or vibration, \
-             {settling} at beginnings, {too_short} in short stretches; {reversals} reversals"
+            "of {samples} samples {in_passes} are in passes; left out: {changing} of changing speed, \
+             load or vibration, {settling} at beginnings, {too_short} in short stretches; {reversals} reversals"
         );
     }
     if !log.dropped.is_empty() {

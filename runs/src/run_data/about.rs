@@ -68,8 +68,8 @@ fn zeros_off(passes: &[MeasuredPass], zeros: &Zeros) -> Vec<String> {
                 continue;
             };
             all.push(format!(
-                "the zero of the {axis} force {what} {:+.1} mN, {:.0} % of the smallest force on that axis, and the readings \
-                 contain it: zero the sensor, let it warm up, and measure again",
+                "the zero of the {axis} force {what} {:+.1} mN, {:.0} % of the smallest force on that axis, \
+                 and the readings contain it: zero the sensor, let it warm up, and measure again",
                 found * 1e3,
                 100.0 * found.abs() / least
             ));

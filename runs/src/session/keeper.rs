@@ -127,6 +127,10 @@ pub fn preamble(job: &Job, start_unix_ns: u64) -> miette::Result<Preamble> {
     Ok(Preamble { start_unix_ns, facts, files })
 }
 
+fn write_rig(job: &Job, dir: &RunDir) -> miette::Result<()> {
+    dir.write("rig.toml", job.setup.rig_file().to_toml().into_diagnostic()?.as_bytes())
+}
+
 impl Keeper {
     /// Begins a session of the run.
     pub fn begin(job: &Job, mut dir: RunDir, planned: usize) -> miette::Result<Self> {
@@ -143,7 +147,7 @@ impl Keeper {
     ) -> miette::Result<Summary> {
         dir.stay();
         if !dir.path().join("rig.toml").exists() {
-            dir.write("rig.toml", job.setup.rig_file().to_toml().into_diagnostic()?.as_bytes())?;
+            write_rig(job, &dir)?;
         }
         if let Some(summary) =
             Summary::written_in(dir.path()).filter(|s| s.outcome == Outcome::Complete && s.passes == planned)
@@ -158,7 +162,7 @@ impl Keeper {
     }
 
     fn of(job: &Job, dir: RunDir, planned: usize) -> miette::Result<Self> {
-        dir.write("rig.toml", job.setup.rig_file().to_toml().into_diagnostic()?.as_bytes())?;
+        write_rig(job, &dir)?;
         let (passes, protocol, guards) = (dir.made.len(), job.plan.protocol(), job.setup.guards());
         Ok(Keeper { dir, passes, planned, protocol, guards, zeros: Zeros::default() })
     }
