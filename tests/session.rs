@@ -347,7 +347,8 @@ fn a_further_experiment_is_diagnosed_with_the_first_run() {
     let (_, (_, told)) = call(&["diagnose", "first", "--save-plan", "next.toml", "--no-pairs"]);
     let next = "next: muprime run next.toml --out NEXT; then muprime diagnose first NEXT, both together";
     assert!(told.contains(next), "{told}");
-    assert_eq!(call(&["run", "next.toml", "--fast", "--out", "second"]).0, Some(0));
+    let (status, (_, told)) = call(&["run", "next.toml", "--fast", "--out", "second"]);
+    assert!(status == Some(0) && told.contains("next: muprime diagnose first second\n"), "{told}");
     let lines = |run: &str| {
         let table = std::fs::read_to_string(folder.path().join(run).join("points.csv")).unwrap();
         table.lines().count() - 1

@@ -24,6 +24,7 @@ use models::covariate::{self, Covariate};
 use models::quantity::PeakToPeak;
 use serde::{Deserialize, Serialize};
 use std::collections::BTreeMap;
+use std::path::PathBuf;
 
 pub(crate) use points::series_place;
 pub use points::{Point, Resolution};
@@ -51,6 +52,10 @@ pub struct PlanFile {
     /// What the plan is for.
     #[serde(default)]
     pub about: String,
+    /// Runs that this plan was designed from, as `muprime diagnose --save-plan` was given them: the run's end
+    /// proposes to diagnose all of them together.
+    #[serde(default, skip_serializing_if = "Vec::is_empty")]
+    pub continues: Vec<PathBuf>,
     /// Seed of the order. `--seed` overrides it.
     #[serde(default)]
     pub seed: u64,

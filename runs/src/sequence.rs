@@ -468,14 +468,9 @@ impl Sequence {
             return;
         }
         if row.now.since(since) > APPROACH_WITHIN {
-            // The stop that follows is an orderly one; its reason is logged here.
-            tracing::warn!(
-                "point {}: the stage did not come to its start position within {} s: the sweep stops",
-                point.number,
-                APPROACH_WITHIN.seconds()
-            );
-            self.stopping = true;
-            return;
+            let (point, found_m) = (point.number, stage.position_m);
+            out.commands.push(Command::Stop);
+            return self.finish(out, Outcome::StartNotReached { point, wanted_m: start, found_m });
         }
         // Slow down towards the goal: the stage has its own acceleration, the way here is a first-order
         // approach.

@@ -14,7 +14,7 @@ use miette::IntoDiagnostic;
 use models::condition::Condition;
 use models::covariate::{self, Covariate};
 use models::rig_file::RigFile;
-use std::path::Path;
+use std::path::{Path, PathBuf};
 
 /// Parts of the operating space that are named, the largest first.
 const PARTS: usize = 6;
@@ -57,14 +57,14 @@ pub fn corrected_model(result: &Diagnosis) -> miette::Result<Option<String>> {
     result.saved_model().map(|model| toml::to_string(&model)).transpose().into_diagnostic()
 }
 
-/// The plan of the experiment that tells most; none where no conditions would tell more.
-pub fn next_plan(result: &Diagnosis) -> Option<String> {
-    result.report.next_experiment.iter().find(|e| !e.conditions.is_empty()).map(plan)
+/// The plan of the experiment that tells most, after these runs; none where no conditions would tell more.
+pub fn next_plan(result: &Diagnosis, continues: &[PathBuf]) -> Option<String> {
+    result.report.next_experiment.iter().find(|e| !e.conditions.is_empty()).map(|e| plan(e, continues))
 }
 
 /// The plan of a designed experiment, one series with a name a condition: those that tell most first, grouped
-/// by pressure, since a chamber is changed once.
-pub fn plan(experiment: &diagnosis::next::Experiment) -> String {
+/// by pressure, since a chamber is changed once. It names the runs that it continues.
+pub fn plan(experiment: &diagnosis::next::Experiment, continues: &[PathBuf]) -> String {
     let mut conditions = experiment.conditions.clone();
     let pressure = |c: &Condition| c.ambient_pressure_pa.unwrap_or(0.0);
     conditions.sort_by(|a, b| pressure(b).total_cmp(&pressure(a)));
@@ -76,8 +76,13 @@ pub fn plan(experiment: &diagnosis::next::Experiment) -> String {
     let short = |v: f64| format!("{v:.5e}").parse().unwrap_or(v);
     let of = |c: &Condition, k: &Covariate| k.of(c).map(|v| (k.name, short(v)));
     let listed = |k: &&Covariate| k.name != covariate::DIRECTION.name;
+    let runs: Vec<_> = continues.iter().map(|run| run.display().to_string()).collect();
+    let runs = match runs.is_empty() {
+        true => String::new(),
+        false => format!("continues = {}\n", toml::Value::from(runs)),
+    };
     let mut text = format!(
-        "# Written by muprime diagnose.\nname = \"next-experiment\"\nabout = {about}\nrandomise = false\n\n[base]\n"
+        "# Written by muprime diagnose.\nname = \"next-experiment\"\nabout = {about}\n{runs}randomise = false\n\n[base]\n"
     );
     let common = covariate::planned().filter(|k| listed(k) && based(k)).filter_map(|k| of(base, k));
     text.extend(common.map(|(name, value)| format!("{name} = {value:e}\n")));
@@ -213,6 +218,7 @@ mod tests {
     use models::quantity::{Direction, PeakToPeak};
     use realtime::ports::Nanos;
     use realtime::safety::Limits;
+    use std::path::PathBuf;
 
     #[test]
     fn neither_certainty_nor_impossibility_is_claimed() {
@@ -238,7 +244,9 @@ mod tests {
             expected_odds: None,
             text: "4 passes that part \"a\" from b".to_string(),
         };
-        let plan = Plan::parse("next.toml", &plan(&experiment)).expect("a plan that can be read");
+        let plan = Plan::parse("next.toml", &plan(&experiment, &["runs/a \"b\"".into()]))
+            .expect("a plan that can be read");
+        assert_eq!(plan.file.continues, [PathBuf::from("runs/a \"b\"")]);
         let resolution = Resolution { amplitude_pp_m: 0.0, frequency_hz: 0.0 };
         let points =
             plan.points(1, &Limits::paper(Nanos(1_000_000)), &resolution).expect("a plan within limits");

@@ -224,7 +224,7 @@ fn save_next(args: &Args, result: &Diagnosis) -> miette::Result<()> {
         }
     }
     if let Some(out) = &args.save_plan {
-        match runs::verdict::next_plan(result) {
+        match runs::verdict::next_plan(result, &args.data) {
             Some(plan) => {
                 write_output(out, plan)?;
                 let all: Vec<_> = args.data.iter().map(|data| quoted(data.display())).collect();

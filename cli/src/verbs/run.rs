@@ -161,6 +161,7 @@ fn measure(job: Job, planned: usize, args: &Args, json: bool) -> miette::Result<
     let mut followers = Followers::begin(&job, planned, args, json)?;
     let before = runs::run_dir::passes_in(&job.out).unwrap_or_default();
     let mut feed = Feed::new(live::Run::of(&job, planned, before.len()), before, &signals);
+    let continued = job.plan.file.continues.clone();
     let summary = rig::session::run(job, &signals, &mut |update| {
         feed.update(&update);
         followers.update(&update);
@@ -169,7 +170,7 @@ fn measure(job: Job, planned: usize, args: &Args, json: bool) -> miette::Result<
     print::draw("", move || bar.finish_and_clear());
     drop(watch);
     if let Ok(summary) = &summary {
-        tell(summary, json);
+        tell(summary, &continued, json);
     }
     feed.end(live::Ended::of(&summary));
     followers.end(&summary, args.publish.as_ref());
@@ -375,7 +376,8 @@ fn progress_bar(json: bool, planned: u64) -> ProgressBar {
     bar
 }
 
-fn tell(summary: &Summary, json: bool) {
+/// Says what came of a run, which may continue others, and what to do next.
+fn tell(summary: &Summary, continued: &[PathBuf], json: bool) {
     let remarked = runs::run_data::about::Remarked::of(summary);
     if json {
         answer_json(&json!({ "summary": remarked }));
@@ -445,8 +447,12 @@ fn tell(summary: &Summary, json: bool) {
     if !page.is_file() {
         return;
     }
-    if summary.model_departed {
-        report!("next: muprime diagnose {}", quoted(summary.folder.display()));
+    // A path that no longer leads to passes is not proposed.
+    let has_passes = |run: &&PathBuf| run.is_file() || run.join("points.csv").is_file();
+    let before: Vec<_> = continued.iter().filter(has_passes).filter(|run| **run != summary.folder).collect();
+    if summary.model_departed || !before.is_empty() {
+        let all = before.into_iter().chain([&summary.folder]).map(|run| quoted(run.display()).to_string());
+        report!("next: muprime diagnose {}", all.collect::<Vec<_>>().join(" "));
     }
     report!("report: {}", page.display());
 }

@@ -3,6 +3,7 @@
 use crate::ambient::{AIR, Level, Source, shown};
 use crate::certificates::temperature::TemperatureFlag;
 use crate::exposure_left::Left;
+use crate::human::quantity;
 use models::pass::Pass;
 use models::prediction::Regime;
 use realtime::compare::PassComparison;
@@ -264,6 +265,15 @@ pub enum Outcome {
         /// The rule that says which.
         cause: Cause,
     },
+    /// The stage did not come to where a pass starts in time.
+    StartNotReached {
+        /// At which point.
+        point: u32,
+        /// The start in m.
+        wanted_m: f64,
+        /// The stage's position in m, read last.
+        found_m: f64,
+    },
     /// A level of the air that the plan asks for was not reached in time.
     LevelNotReached {
         /// Its column in the point table.
@@ -298,6 +308,16 @@ impl Outcome {
             Outcome::NoContact { .. } => Some(
                 "check that the finger is lowered, the load or `dead_weight_n`, that lateral and normal are not swapped, and the sign, unit and gain of normal",
             ),
+            Outcome::StartNotReached { .. } => Some(
+                "check unit, sign and resolution of the stage's position: a pass starts within 0.2 mm; a slower `approach_speed_m_s` may help",
+            ),
+            Outcome::LevelNotReached { .. } => Some(
+                "check the chamber and its sensor, or give more time or a wider band in `[tolerances]` of the plan",
+            ),
+            Outcome::LoopLost => Some("'muprime doctor' tells what stalls the computer"),
+            Outcome::RecordLost | Outcome::ExposureNotKept => {
+                Some("make room on the disk, and check that nothing else holds up its writing")
+            }
             _ => self.cause().map(Cause::remedy),
         }
     }
@@ -316,6 +336,11 @@ impl Outcome {
                 "no contact at point {point}: the normal force is {normal:.4} N, and at least {least:.4} N is needed"
             ),
             Outcome::NoContact { point, .. } => format!("no contact at point {point}"),
+            Outcome::StartNotReached { point, wanted_m, found_m } => format!(
+                "the stage did not reach the start of point {point}: it is at {}, the start at {}",
+                quantity(*found_m, "m"),
+                quantity(*wanted_m, "m")
+            ),
             Outcome::Frozen { point, cause } => format!("no data at point {point}: {}", cause.words()),
             Outcome::LevelNotReached { quantity, wanted, found } => {
                 let at = AIR.iter().position(|(covariate, _)| covariate.name == quantity);

@@ -132,6 +132,22 @@ fn each_end_from_outside_has_its_own_outcome() {
     }
 }
 
+/// A stage whose position is too coarse never comes to the start of a pass: nobody requested that stop.
+#[test]
+fn a_start_that_is_not_reached_is_no_stop_on_request() {
+    let mut world = sim::world::WorldConfig::ideal();
+    world.stage.encoder_m = 7e-3;
+    let (passes, events, rows, outcome) = swept_on(&world, 600.0, |_| false, None);
+    assert!(passes.is_empty(), "{events:?}");
+    assert!(
+        matches!(outcome, Outcome::StartNotReached { point: 0, wanted_m, found_m }
+        if (1e-3..4e-3).contains(&(wanted_m - found_m).abs())),
+        "{outcome:?}"
+    );
+    assert!(outcome.remedy().is_some_and(|remedy| remedy.contains("resolution")));
+    assert!(rows.iter().all(|(row, _)| row.drive_pp_m == 0.0));
+}
+
 /// A pause that nobody ends is ended by its limit, with the rig off; what was measured is stored.
 #[test]
 fn a_pause_has_an_end() {

@@ -29,7 +29,7 @@ pub fn write(
         (PAGE, Some(html.to_string())),
         (DOCUMENT, Some(document(result, rig, damage).into_diagnostic()?)),
         (CORRECTED_MODEL, super::corrected_model(result)?),
-        (NEXT_PLAN, super::next_plan(result)),
+        (NEXT_PLAN, super::next_plan(result, &[run.to_path_buf()])),
     ];
     for (name, text) in all {
         let file = run.join(name);
