@@ -4,8 +4,8 @@
 //! an earlier one left. After a time without an answer the driver only listens before the next request, so
 //! that a late half is never joined to a new one.
 
-use super::ended::{Closed, Ended};
-use super::session::{LONGEST_SLEEP, Periodic, Session};
+use super::connection::{Connection, LONGEST_SLEEP, Periodic, Spawned};
+use super::ended::Ended;
 use super::setup::InstrumentSetup;
 use super::slcan::Slcan;
 use super::socketcan::KernelCan;
@@ -16,7 +16,6 @@ use instruments::codec::can::CanFrame;
 use instruments::profile::{FrameKind, Part};
 use realtime::ports::Nanos;
 use std::convert::Infallible;
-use std::thread::JoinHandle;
 use std::time::{Duration, Instant};
 
 /// The message for a controller whose error counters are at 96, or at 128: then no node hears of a broken
@@ -38,23 +37,23 @@ pub fn open(address: &str, bitrate: u32) -> Result<Box<dyn CanPort>, Ended> {
 }
 
 /// Starts the thread of one instrument.
-pub(crate) fn spawn(instrument: &InstrumentSetup, session: Session) -> Result<JoinHandle<Closed>, Ended> {
-    let link = session.endpoint.profile().description.link.clone();
+pub(crate) fn spawn(instrument: &InstrumentSetup, connection: Connection) -> Spawned {
+    let link = connection.endpoint.profile().description.link.clone();
     let address = instrument.address.clone();
     let base = instrument.base.or(link.base).unwrap_or(0);
     let (bitrate, rate_hz) = (link.bitrate.unwrap_or(1_000_000), instrument.rate_hz);
-    session.spawn(move |session| {
+    connection.spawn(move |connection| {
         let mut port = open(&address, bitrate)?;
-        let health = session.endpoint.health();
+        let health = connection.endpoint.health();
         health.count(&health.connections);
-        for init in &session.endpoint.profile().description.init {
+        for init in &connection.endpoint.profile().description.init {
             if let Some(frame) =
                 init.can.as_ref().and_then(|(id, data)| CanFrame::build(*id, *id > 0x7FF, data))
             {
                 port.send(&frame)?;
             }
         }
-        converse(session, port.as_mut(), base, rate_hz)
+        converse(connection, port.as_mut(), base, rate_hz)
     })
 }
 
@@ -69,9 +68,9 @@ struct Group {
     requested_at: Option<Instant>,
 }
 
-fn groups(session: &Session, base: u32, rate_hz: Option<f64>) -> Vec<Group> {
-    let profile = session.endpoint.profile();
-    let now = session.now();
+fn groups(connection: &Connection, base: u32, rate_hz: Option<f64>) -> Vec<Group> {
+    let profile = connection.endpoint.profile();
+    let now = connection.now();
     let frames = profile.frames().iter().enumerate();
     let group = |(i, frame): (usize, &instruments::profile::Frame)| {
         let FrameKind::Messages(index, parts) = &frame.kind else { return None };
@@ -93,23 +92,23 @@ fn groups(session: &Session, base: u32, rate_hz: Option<f64>) -> Vec<Group> {
 }
 
 fn converse(
-    session: &mut Session,
+    connection: &mut Connection,
     port: &mut dyn CanPort,
     base: u32,
     rate_hz: Option<f64>,
 ) -> Result<Infallible, Ended> {
-    let limit_ms = session.endpoint.profile().description.link.response_timeout_ms;
+    let limit_ms = connection.endpoint.profile().description.link.response_timeout_ms;
     let limit = Duration::from_millis(u64::from(limit_ms));
-    let mut groups = groups(session, base, rate_hz);
+    let mut groups = groups(connection, base, rate_hz);
     // Late answers to an earlier connection are discarded.
     let quiet = Instant::now() + limit;
     while port.receive(quiet)?.is_some() && Instant::now() < quiet {}
     let mut heard = Instant::now();
     loop {
-        if session.stopping() {
+        if connection.stopping() {
             return Err(Ended::Stopped);
         }
-        let now = session.now();
+        let now = connection.now();
         for group in &mut groups {
             let waiting = group.requested_at.is_some();
             if let Some((request, periodic)) =
@@ -131,24 +130,25 @@ fn converse(
         }
         let open = groups.iter().filter(|group| group.requested_at.is_none());
         let next = open.filter_map(|group| group.request.as_ref()).map(|(_, periodic)| periodic.due).min();
-        let pause = next
-            .map_or(LONGEST_SLEEP, |due| Duration::from_nanos(due.since(session.now()).0).min(LONGEST_SLEEP));
+        let pause = next.map_or(LONGEST_SLEEP, |due| {
+            Duration::from_nanos(due.since(connection.now()).0).min(LONGEST_SLEEP)
+        });
         match port.receive(Instant::now() + pause)? {
             None | Some(CanEvent::Other) => {}
             Some(CanEvent::BusOff) => return Err(Ended::Io(LEFT.into())),
             Some(CanEvent::Passive) => return Err(Ended::Io(PASSIVE.into())),
-            Some(CanEvent::Warning) => session.endpoint.health().problem(WARNS),
+            Some(CanEvent::Warning) => connection.endpoint.health().problem(WARNS),
             Some(CanEvent::Frame(frame, ago)) => {
                 let ago = Nanos(u64::try_from(ago.as_nanos()).unwrap_or(0));
-                let arrived = session.now().since(ago);
+                let arrived = connection.now().since(ago);
                 for group in &mut groups {
                     if group.take(&frame) {
                         heard = Instant::now();
                         group.requested_at = None;
                         let bytes = std::mem::take(&mut group.bytes);
                         group.next = 0;
-                        session.endpoint.frame(group.frame, &bytes, arrived)?;
-                        session.tell(Ok(()));
+                        connection.endpoint.frame(group.frame, &bytes, arrived)?;
+                        connection.tell(Ok(()));
                     }
                 }
             }
@@ -184,12 +184,14 @@ impl Group {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::ended::Closed;
     use crate::endpoint::Endpoint;
     use crate::setup::AxisSetup;
     use realtime::ports::{ForceSensor, NoData};
     use std::collections::VecDeque;
     use std::sync::atomic::{AtomicBool, Ordering};
     use std::sync::{Arc, Mutex};
+    use std::thread::JoinHandle;
 
     #[test]
     fn an_identifier_of_29_bits_is_not_the_one_of_11() {
@@ -197,8 +199,8 @@ mod tests {
         let setup = InstrumentSetup { normal: axis("fz"), ..InstrumentSetup::new("ati-netft-can", "none") };
         let (endpoint, _port) = Endpoint::force(setup.description().unwrap(), &setup).unwrap();
         let (ready, _opened) = std::sync::mpsc::sync_channel(1);
-        let session = Session::new(endpoint, Instant::now(), Arc::default(), ready);
-        let mut group = groups(&session, 432, None).remove(0);
+        let connection = Connection::new(endpoint, Instant::now(), Arc::default(), ready);
+        let mut group = groups(&connection, 432, None).remove(0);
         group.requested_at = Some(Instant::now());
         group.take(&CanFrame::build(HALVES[0], true, &[9; 8]).unwrap());
         assert!(group.bytes.is_empty(), "another instrument's");
@@ -284,9 +286,9 @@ mod tests {
             let (health, epoch) = (endpoint.health(), Instant::now());
             let (ready, opened) = std::sync::mpsc::sync_channel(1);
             let stop = Arc::new(AtomicBool::new(false));
-            let session = Session::new(endpoint, epoch, Arc::clone(&stop), ready);
+            let connection = Connection::new(endpoint, epoch, Arc::clone(&stop), ready);
             assert_eq!(
-                groups(&session, 432, None)[0].parts.iter().map(|p| p.at(432).0).collect::<Vec<_>>(),
+                groups(&connection, 432, None)[0].parts.iter().map(|p| p.at(432).0).collect::<Vec<_>>(),
                 HALVES
             );
             let bus = Bus {
@@ -298,8 +300,8 @@ mod tests {
             };
             let ended = Arc::new(Mutex::new(Vec::new()));
             let (mut shared, ends) = (bus.clone(), Arc::clone(&ended));
-            let thread = session.spawn(move |session| {
-                let over = converse(session, &mut shared, 432, None);
+            let thread = connection.spawn(move |connection| {
+                let over = converse(connection, &mut shared, 432, None);
                 ends.lock().unwrap().extend(over.as_ref().err().map(ToString::to_string));
                 over
             });

@@ -5,10 +5,10 @@
 //! the rig, never by itself.
 
 use super::can::{self, LEFT, PASSIVE, WARNS};
-use super::ended::{Closed, Ended};
+use super::connection::{Connection, LONGEST_SLEEP, Periodic, Spawned};
+use super::ended::Ended;
 use super::endpoint::{BadFrame, Due};
 use super::off::{self, OFF_ANSWER_MS, OffWay};
-use super::session::{LONGEST_SLEEP, Periodic, Session};
 use super::setup::InstrumentSetup;
 use instruments::bus::{CanEvent, CanPort};
 use instruments::codec::can::CanFrame;
@@ -16,7 +16,6 @@ use instruments::codec::canopen::{self, DriveState, SdoAnswer};
 use instruments::profile::FrameKind;
 use instruments::{FrameId, SetId, SignalId};
 use std::convert::Infallible;
-use std::thread::JoinHandle;
 use std::time::{Duration, Instant};
 
 /// The low half of a device type that says CiA 402.
@@ -25,24 +24,24 @@ const PROFILE_402: u32 = 402;
 const NOT_ENABLED: u16 = 0x07;
 
 /// Starts the thread of one drive.
-pub(crate) fn spawn(instrument: &InstrumentSetup, session: Session) -> Result<JoinHandle<Closed>, Ended> {
-    let link = session.endpoint.profile().description.link.clone();
+pub(crate) fn spawn(instrument: &InstrumentSetup, connection: Connection) -> Spawned {
+    let link = connection.endpoint.profile().description.link.clone();
     let address = instrument.address.clone();
     let node = instrument.base.or(link.node.map(u32::from)).unwrap_or(1);
     let node = u8::try_from(node).ok().filter(|node| (1..=127).contains(node));
     let node = node.ok_or_else(|| Ended::Io("CANopen has the nodes 1 to 127: correct `base`".into()))?;
-    session.spawn(move |session| {
+    connection.spawn(move |connection| {
         let port = can::open(&address, link.bitrate.unwrap_or(1_000_000))?;
-        let health = session.endpoint.health();
+        let health = connection.endpoint.health();
         health.count(&health.connections);
         let map =
-            Map::of(session, node).ok_or_else(|| Ended::Io("the profile is no CiA 402 drive's".into()))?;
+            Map::of(connection, node).ok_or_else(|| Ended::Io("the profile is no CiA 402 drive's".into()))?;
         let block = vec![0; map.length];
         let limit_ms = link.response_timeout_ms;
         let mut master = Master { port, node, limit_ms, map, block, tries: 0 };
-        off::at_the_beginning(session, &mut master)?;
-        master.set_up(session)?;
-        master.go_on(session, Duration::from_millis(u64::from(link.heartbeat_ms.unwrap_or(300))))
+        off::at_the_beginning(connection, &mut master)?;
+        master.set_up(connection)?;
+        master.go_on(connection, Duration::from_millis(u64::from(link.heartbeat_ms.unwrap_or(300))))
     })
 }
 
@@ -60,8 +59,8 @@ struct Map {
 
 impl Map {
     /// `None` for a profile that would have been refused: one frame each way, with a status word.
-    fn of(session: &Session, node: u8) -> Option<Self> {
-        let profile = session.endpoint.profile();
+    fn of(connection: &Connection, node: u8) -> Option<Self> {
+        let profile = connection.endpoint.profile();
         let (data, status, block) =
             (FrameId(0), profile.signal("statusword")?, profile.description.write.first()?);
         let FrameKind::Messages(_, parts) = &profile.frames().first()?.kind else { return None };
@@ -135,7 +134,7 @@ impl Master {
         }
     }
 
-    fn set_up(&mut self, session: &mut Session) -> Result<(), Ended> {
+    fn set_up(&mut self, connection: &mut Connection) -> Result<(), Ended> {
         let kind = self.read(0x1000, 0)?;
         if kind & 0xFFFF != PROFILE_402 {
             let problem = format!("node {} is not a drive of CiA 402 (device type {kind:#010x})", self.node);
@@ -143,12 +142,12 @@ impl Master {
         }
         let status = self.read(0x6041, 0)?;
         let faulted = u16::try_from(status & 0xFFFF).ok().and_then(DriveState::of) == Some(DriveState::Fault);
-        if faulted && session.is_first() {
+        if faulted && connection.is_first() {
             // A person has just opened the rig: this is the one place where a fault is reset.
             self.write(0x6040, 0, 2, 0)?;
             self.write(0x6040, 0, 2, 0x80)?;
         }
-        for init in session.endpoint.profile().description.init.clone() {
+        for init in connection.endpoint.profile().description.init.clone() {
             if let Some((index, sub, bytes, value)) = init.sdo {
                 self.write(index, sub, bytes, value)?;
             }
@@ -160,38 +159,38 @@ impl Master {
         self.send(&canopen::start(self.node))
     }
 
-    fn go_on(&mut self, session: &mut Session, heartbeat: Duration) -> Result<Infallible, Ended> {
-        let mut write = Periodic::new(self.map.rate_hz, session.now());
+    fn go_on(&mut self, connection: &mut Connection, heartbeat: Duration) -> Result<Infallible, Ended> {
+        let mut write = Periodic::new(self.map.rate_hz, connection.now());
         let mut alive = Instant::now();
         loop {
-            if session.stopping() {
-                return Err(off::at_the_end(session, self));
+            if connection.stopping() {
+                return Err(off::at_the_end(connection, self));
             }
             if alive.elapsed() > heartbeat {
                 return Err(Ended::Io(format!("node {} gives no sign of life", self.node)));
             }
-            let now = session.now();
+            let now = connection.now();
             if write.is_due(now) {
-                match session.endpoint.due(now) {
+                match connection.endpoint.due(now) {
                     Due::Nothing => {}
                     Due::SetPoints(set_points) => {
                         #[allow(clippy::cast_possible_truncation, clippy::cast_sign_loss)] // 16 bits
-                        let state = DriveState::of(session.endpoint.value(self.map.status) as u16);
+                        let state = DriveState::of(connection.endpoint.value(self.map.status) as u16);
                         let control = state.and_then(DriveState::towards_enabled).unwrap_or(0);
-                        self.process_data(session, control, &set_points)?;
+                        self.process_data(connection, control, &set_points)?;
                     }
                     // Only the loop's own commands enable; the safe set-points do not.
-                    Due::Safe(_) => self.send_off(session)?,
+                    Due::Safe(_) => self.send_off(connection)?,
                 }
-                write.advance(session.now());
+                write.advance(connection.now());
             }
-            let pause = Duration::from_nanos(write.due.since(session.now()).0).min(LONGEST_SLEEP);
+            let pause = Duration::from_nanos(write.due.since(connection.now()).0).min(LONGEST_SLEEP);
             match self.receive(Instant::now() + pause)? {
                 Some(CanEvent::Frame(frame, _)) if frame.id == self.map.cob => {
                     alive = Instant::now();
-                    let arrived = session.now();
-                    session.endpoint.frame(self.map.data, frame.data(), arrived)?;
-                    session.tell(Ok(()));
+                    let arrived = connection.now();
+                    connection.endpoint.frame(self.map.data, frame.data(), arrived)?;
+                    connection.tell(Ok(()));
                 }
                 Some(CanEvent::Frame(frame, _)) if frame.id == 0x700 + u32::from(self.node) => {
                     alive = Instant::now();
@@ -202,11 +201,11 @@ impl Master {
                 Some(CanEvent::Frame(frame, _)) if frame.id == 0x80 + u32::from(self.node) => {
                     let word = frame.data().iter().take(2).rev();
                     let code = word.fold(0_u32, |sum, byte| sum << 8 | u32::from(*byte));
-                    session.endpoint.alarm(&format!("emergency {code:#06x}"));
+                    connection.endpoint.alarm(&format!("emergency {code:#06x}"));
                 }
                 Some(CanEvent::BusOff) => return Err(Ended::Io(LEFT.into())),
                 Some(CanEvent::Passive) => return Err(Ended::Io(PASSIVE.into())),
-                Some(CanEvent::Warning) => session.endpoint.health().problem(WARNS),
+                Some(CanEvent::Warning) => connection.endpoint.health().problem(WARNS),
                 _ => {}
             }
         }
@@ -214,12 +213,12 @@ impl Master {
 
     fn process_data(
         &mut self,
-        session: &Session,
+        connection: &Connection,
         control: u16,
         set_points: &[(SetId, f64)],
     ) -> Result<(), Ended> {
         for (set, value) in set_points {
-            let _ = session.endpoint.profile().encode_set(*set, *value, &mut self.block);
+            let _ = connection.endpoint.profile().encode_set(*set, *value, &mut self.block);
         }
         self.block[..2].copy_from_slice(&control.to_le_bytes());
         let frame = CanFrame::new(self.map.out, &self.block);
@@ -229,9 +228,9 @@ impl Master {
 }
 
 impl OffWay for Master {
-    fn send_off(&mut self, session: &mut Session) -> Result<(), Ended> {
-        let safe = session.endpoint.hand_out_off(session.now());
-        let sent = self.process_data(session, NOT_ENABLED, &safe);
+    fn send_off(&mut self, connection: &mut Connection) -> Result<(), Ended> {
+        let safe = connection.endpoint.hand_out_off(connection.now());
+        let sent = self.process_data(connection, NOT_ENABLED, &safe);
         self.tries += 1;
         // A drive that is not operational takes no process data, but service data: the second way, where the
         // first has not shown itself or where nobody knows the drive's state.
@@ -246,19 +245,19 @@ impl OffWay for Master {
         }
     }
 
-    fn be_patient(&mut self, _session: &Session) {
+    fn be_patient(&mut self, _connection: &Connection) {
         self.limit_ms = self.limit_ms.max(OFF_ANSWER_MS);
     }
 
-    fn read_state(&mut self, session: &mut Session) -> Result<(), Ended> {
+    fn read_state(&mut self, connection: &mut Connection) -> Result<(), Ended> {
         let deadline = Instant::now() + Duration::from_millis(u64::from(self.limit_ms));
         while let Some(event) = self.receive(deadline)? {
             if let CanEvent::Frame(frame, _) = event
                 && frame.id == self.map.cob
             {
-                let arrived = session.now();
-                session.endpoint.frame(self.map.data, frame.data(), arrived)?;
-                if session.endpoint.reads_off() {
+                let arrived = connection.now();
+                connection.endpoint.frame(self.map.data, frame.data(), arrived)?;
+                if connection.endpoint.reads_off() {
                     self.tries = 0;
                     return Ok(());
                 }
@@ -297,13 +296,13 @@ mod tests {
         InstrumentSetup { dead_weight_n, ..InstrumentSetup::new("cia402-profile-velocity", "none") }
     }
 
-    fn session() -> Session {
+    fn connection() -> Connection {
         let endpoint = Endpoint::stage(crate::profile(&stage().profile).unwrap(), &stage()).unwrap().0;
-        Session::new(endpoint, Instant::now(), Arc::default(), std::sync::mpsc::sync_channel(1).0)
+        Connection::new(endpoint, Instant::now(), Arc::default(), std::sync::mpsc::sync_channel(1).0)
     }
 
-    fn master(session: &Session, port: impl CanPort + 'static) -> Master {
-        let map = Map::of(session, 5).unwrap();
+    fn master(connection: &Connection, port: impl CanPort + 'static) -> Master {
+        let map = Map::of(connection, 5).unwrap();
         let block = vec![0; map.length];
         Master { port: Box::new(port), node: 5, limit_ms: 20, map, block, tries: 0 }
     }
@@ -324,11 +323,11 @@ mod tests {
     #[test]
     fn a_frame_of_29_bits_is_not_the_drives() {
         for extended in [false, true] {
-            let mut session = session();
+            let mut connection = connection();
             let foreign = Foreign(CanFrame::build(0x185, extended, &[0; 8]));
-            let mut master = master(&session, foreign);
-            master.read_state(&mut session).unwrap();
-            let status = session.endpoint.value(master.map.status);
+            let mut master = master(&connection, foreign);
+            master.read_state(&mut connection).unwrap();
+            let status = connection.endpoint.value(master.map.status);
             assert_eq!(status.is_nan(), extended, "{status}");
         }
     }
@@ -336,17 +335,17 @@ mod tests {
     /// Set-points that no frame can carry are a failure: nobody would know that an 'off' was never sent.
     #[test]
     fn set_points_that_no_frame_carries_are_not_taken_as_sent() {
-        let session = session();
-        let mut master = master(&session, Foreign(None));
-        assert_eq!(master.process_data(&session, 0, &[]), Ok(()));
+        let connection = connection();
+        let mut master = master(&connection, Foreign(None));
+        assert_eq!(master.process_data(&connection, 0, &[]), Ok(()));
         master.map.out = 0x800;
-        assert!(master.process_data(&session, 0, &[]).is_err());
+        assert!(master.process_data(&connection, 0, &[]).is_err());
     }
 
     #[test]
     fn a_node_beyond_127_is_refused() {
         for base in [0, 128, 300] {
-            let refused = spawn(&InstrumentSetup { base: Some(base), ..stage() }, session());
+            let refused = spawn(&InstrumentSetup { base: Some(base), ..stage() }, connection());
             assert!(matches!(refused, Err(Ended::Io(why)) if why.contains("1 to 127")), "{base}");
         }
     }
@@ -354,13 +353,13 @@ mod tests {
     /// Switching off waits for the drive's state: no longer than it may, however full the bus is.
     #[test]
     fn a_full_bus_does_not_hold_up_an_off() {
-        let mut session = session();
-        let mut master = master(&session, Flood);
+        let mut connection = connection();
+        let mut master = master(&connection, Flood);
         let (done, ended) = std::sync::mpsc::channel();
         // A thread of its own: what hangs must fail, not hang the test.
         std::thread::spawn(move || {
             let began = Instant::now();
-            let over = off::switch_off(&mut session, &mut master);
+            let over = off::switch_off(&mut connection, &mut master);
             let _ = done.send((over.map_err(|ended| ended.to_string()), began.elapsed()));
         });
         let most = off::OFF_WITHIN + Duration::from_secs(120);

@@ -46,7 +46,7 @@
 //! | [`library`] | profiles from files and folders |
 //! | [`mailbox`] | the newest command on its way from the loop to a link |
 //! | [`ended`] | why a conversation ended, and how its link was closed |
-//! | [`session`] | the life of a link: connect, converse, back off |
+//! | [`connection`] | the life of a link: connect, converse, back off |
 //! | [`off`] | how an instrument is switched off and read back, whatever the wire |
 //! | [`modbus`] | the conversation with registers, over [`modbus_tcp`] or [`modbus_rtu`] |
 //! | [`can`] | the conversation in CAN messages, over [`slcan`] or [`socketcan`] |
@@ -67,6 +67,7 @@ pub mod bundled;
 pub mod can;
 pub mod canopen;
 pub mod chamber;
+pub mod connection;
 pub mod ended;
 pub mod endpoint;
 pub mod health;
@@ -81,7 +82,6 @@ pub mod peek;
 pub mod ports;
 pub mod remedy;
 pub mod serial;
-pub mod session;
 pub mod setup;
 pub mod slcan;
 #[cfg(all(feature = "can", target_os = "linux"))]
@@ -100,12 +100,12 @@ pub use ended::{Closed, Ended};
 pub use health::{Health, HealthReport};
 pub use setup::{AxisSetup, InstrumentSetup, InstrumentsSetup, SetupError};
 
+use connection::Connection;
 use endpoint::Endpoint;
 use instruments::Profile;
 use instruments::schema::LinkKind;
 use realtime::clock::Clock;
 use realtime::ports::{Absent, Amplifier, ForceSensor, SafetyInputs, Stage, SupplySwitch};
-use session::Session;
 use std::sync::Arc;
 use std::sync::atomic::{AtomicBool, Ordering};
 use std::thread::JoinHandle;
@@ -307,22 +307,22 @@ fn start<Port>(
     let (endpoint, port) = made.map_err(|problem| instrument.mismatch(problem))?;
     let (health, role) = (endpoint.health(), endpoint.role());
     let (ready, opened) = std::sync::mpsc::sync_channel(1);
-    let session = Session::new(endpoint, links.clock.clone(), Arc::clone(&links.stop), ready);
+    let connection = Connection::new(endpoint, links.clock.clone(), Arc::clone(&links.stop), ready);
     let (id, address) = (&instrument.profile, &instrument.address);
     let failed = |problem| OpenError::Link { id: id.clone(), address: address.clone(), problem };
-    let thread = match session.endpoint.profile().description.link.kind {
+    let thread = match connection.endpoint.profile().description.link.kind {
         // Registers are registers: `rtu:PATH` reaches the same map over a serial line.
         LinkKind::ModbusTcp if !instrument.address.starts_with("rtu:") => {
-            modbus_tcp::spawn(instrument, session)
+            modbus_tcp::spawn(instrument, connection)
         }
-        LinkKind::ModbusTcp | LinkKind::ModbusRtu => modbus_rtu::spawn(instrument, session),
-        LinkKind::Can if !session.endpoint.role().only_measures() => {
+        LinkKind::ModbusTcp | LinkKind::ModbusRtu => modbus_rtu::spawn(instrument, connection),
+        LinkKind::Can if !connection.endpoint.role().only_measures() => {
             return Err(instrument.mismatch(SetupError::PlainCan));
         }
-        LinkKind::Can => can::spawn(instrument, session),
-        LinkKind::Canopen => canopen::spawn(instrument, session),
+        LinkKind::Can => can::spawn(instrument, connection),
+        LinkKind::Canopen => canopen::spawn(instrument, connection),
         LinkKind::Serial | LinkKind::Tcp | LinkKind::Udp | LinkKind::Scpi | LinkKind::Sysfs => {
-            text::spawn(instrument, session)
+            text::spawn(instrument, connection)
         }
     }
     .map_err(failed)?;

@@ -1,9 +1,9 @@
 //! The conversation with an instrument of registers, whatever carries it.
 
+use super::connection::{Connection, Periodic};
 use super::ended::{BAD_IN_A_ROW, Ended};
 use super::endpoint::Due;
 use super::off::{self, OFF_ANSWER_MS, OffWay};
-use super::session::{Periodic, Session};
 use instruments::profile::{Profile, Span};
 use instruments::schema::{Poll, Table, Write};
 use instruments::{FrameId, SetId};
@@ -86,18 +86,18 @@ impl<'a> Conversation<'a> {
     ///
     /// # Errors
     /// Why the connection is of no use.
-    pub fn begin(session: &mut Session, wire: &'a mut dyn Registers) -> Result<Self, Ended> {
-        let mut conversation = Self { wire, blocks: Blocks::of(session.endpoint.profile()), bad: 0 };
-        off::at_the_beginning(session, &mut conversation)?;
-        let set_up = session.endpoint.profile().description.init.is_empty();
-        session.endpoint.hold(!set_up);
-        for (frame, poll) in polls(session) {
-            conversation.read(session, frame, &poll)?;
+    pub fn begin(connection: &mut Connection, wire: &'a mut dyn Registers) -> Result<Self, Ended> {
+        let mut conversation = Self { wire, blocks: Blocks::of(connection.endpoint.profile()), bad: 0 };
+        off::at_the_beginning(connection, &mut conversation)?;
+        let set_up = connection.endpoint.profile().description.init.is_empty();
+        connection.endpoint.hold(!set_up);
+        for (frame, poll) in polls(connection) {
+            conversation.read(connection, frame, &poll)?;
         }
-        conversation.initialise(session)?;
-        session.endpoint.hold(false);
+        conversation.initialise(connection)?;
+        connection.endpoint.hold(false);
         if !set_up {
-            conversation.read_state(session)?;
+            conversation.read_state(connection)?;
         }
         Ok(conversation)
     }
@@ -106,70 +106,70 @@ impl<'a> Conversation<'a> {
     ///
     /// # Errors
     /// Always: why it ended.
-    pub fn go_on(mut self, session: &mut Session, rate_hz: Option<f64>) -> Result<Infallible, Ended> {
-        session.tell(Ok(()));
-        let now = session.now();
+    pub fn go_on(mut self, connection: &mut Connection, rate_hz: Option<f64>) -> Result<Infallible, Ended> {
+        connection.tell(Ok(()));
+        let now = connection.now();
         let often = |(frame, poll): (FrameId, Poll)| {
             poll.rate_hz.map(|rate| (Periodic::new(rate_hz.unwrap_or(rate), now), frame, poll))
         };
-        let mut reads: Vec<_> = polls(session).into_iter().filter_map(often).collect();
+        let mut reads: Vec<_> = polls(connection).into_iter().filter_map(often).collect();
         // All blocks at the rate of the fastest: one command is in all of them.
-        let blocks = session.endpoint.profile().description.write.iter();
+        let blocks = connection.endpoint.profile().description.write.iter();
         let rates = blocks.map(|block| block.rate_hz.unwrap_or(100.0));
         let mut write = rates.reduce(f64::max).map(|rate| Periodic::new(rate, now));
         loop {
-            if session.stopping() {
-                return Err(off::at_the_end(session, &mut self));
+            if connection.stopping() {
+                return Err(off::at_the_end(connection, &mut self));
             }
-            let now = session.now();
+            let now = connection.now();
             if let Some(periodic) = write.as_mut().filter(|periodic| periodic.is_due(now)) {
-                match session.endpoint.due(now) {
+                match connection.endpoint.due(now) {
                     Due::Nothing => {}
-                    Due::SetPoints(set_points) => self.command(session, &set_points)?,
-                    Due::Safe(_) => self.send_off(session)?,
+                    Due::SetPoints(set_points) => self.command(connection, &set_points)?,
+                    Due::Safe(_) => self.send_off(connection)?,
                 }
-                periodic.advance(session.now());
+                periodic.advance(connection.now());
             }
             for (periodic, frame, poll) in &mut reads {
-                if periodic.is_due(session.now()) {
-                    self.read(session, *frame, poll)?;
-                    periodic.advance(session.now());
+                if periodic.is_due(connection.now()) {
+                    self.read(connection, *frame, poll)?;
+                    periodic.advance(connection.now());
                 }
             }
             let next =
                 reads.iter().map(|(periodic, ..)| periodic.due).chain(write.as_ref().map(|w| w.due)).min();
-            session.sleep_until(next);
+            connection.sleep_until(next);
         }
     }
 
-    fn read(&mut self, session: &mut Session, frame: FrameId, poll: &Poll) -> Result<(), Ended> {
+    fn read(&mut self, connection: &mut Connection, frame: FrameId, poll: &Poll) -> Result<(), Ended> {
         // The first read that brings nothing ends the sample.
-        let spans = session.endpoint.profile().frames()[frame.0].spans.clone();
+        let spans = connection.endpoint.profile().frames()[frame.0].spans.clone();
         let read = |span: &Span| self.wire.read(poll.table, span.address, span.count);
         let answer: Result<Vec<Vec<u8>>, Trouble> = spans.iter().map(read).collect();
         let answer = answer.map(|parts| parts.concat());
-        let arrived = session.now();
-        if let Some(bytes) = self.judge(session, answer)? {
+        let arrived = connection.now();
+        if let Some(bytes) = self.judge(connection, answer)? {
             // A library may check the length in debug builds only; a short answer is refused here.
-            session.endpoint.frame(frame, &bytes, arrived)?;
+            connection.endpoint.frame(frame, &bytes, arrived)?;
         }
         Ok(())
     }
 
     /// Sends the loop's command in one piece. One that is not taken is followed by an 'off' at once.
-    fn command(&mut self, session: &mut Session, set_points: &[(SetId, f64)]) -> Result<(), Ended> {
-        let answer = self.write(session, set_points);
-        if self.judge(session, answer)?.is_none() {
-            session.endpoint.refused();
-            self.send_off(session)?;
+    fn command(&mut self, connection: &mut Connection, set_points: &[(SetId, f64)]) -> Result<(), Ended> {
+        let answer = self.write(connection, set_points);
+        if self.judge(connection, answer)?.is_none() {
+            connection.endpoint.refused();
+            self.send_off(connection)?;
         }
         Ok(())
     }
 
     /// Every block that holds one of the set-points, even after a failure; returns the first trouble.
-    fn write(&mut self, session: &Session, set_points: &[(SetId, f64)]) -> Result<(), Trouble> {
+    fn write(&mut self, connection: &Connection, set_points: &[(SetId, f64)]) -> Result<(), Trouble> {
         let mut outcome = Ok(());
-        for (block, registers) in self.blocks.put(session.endpoint.profile(), set_points) {
+        for (block, registers) in self.blocks.put(connection.endpoint.profile(), set_points) {
             match self.wire.write(block.table, block.address, &registers) {
                 Err(Trouble::Ended(ended)) => return Err(Trouble::Ended(ended)),
                 written => outcome = outcome.and(written),
@@ -179,8 +179,8 @@ impl<'a> Conversation<'a> {
     }
 
     /// Tells 'the instrument refused' from 'we could not talk'. A few bad answers are borne.
-    fn judge<T>(&mut self, session: &Session, answer: Result<T, Trouble>) -> Result<Option<T>, Ended> {
-        let health = session.endpoint.health();
+    fn judge<T>(&mut self, connection: &Connection, answer: Result<T, Trouble>) -> Result<Option<T>, Ended> {
+        let health = connection.endpoint.health();
         let ended = match answer {
             Ok(value) => {
                 self.bad = 0;
@@ -199,13 +199,13 @@ impl<'a> Conversation<'a> {
         health.problem(ended.to_string());
         self.bad += 1;
         // Before the first sample there is nothing to bear with a refusal: the map is wrong.
-        let hopeless = session.is_first() && matches!(ended, Ended::Refused(_));
+        let hopeless = connection.is_first() && matches!(ended, Ended::Refused(_));
         if self.bad >= BAD_IN_A_ROW || hopeless { Err(ended) } else { Ok(None) }
     }
 
     /// What the profile wants done before the samples count, once the signature is known to hold.
-    fn initialise(&mut self, session: &Session) -> Result<(), Ended> {
-        for init in &session.endpoint.profile().description.init {
+    fn initialise(&mut self, connection: &Connection) -> Result<(), Ended> {
+        for init in &connection.endpoint.profile().description.init {
             let done = match (init.function, init.copy, &init.registers) {
                 (Some((function, data)), ..) => self.wire.own_function(function, data),
                 (None, Some((from, to, count)), _) => self
@@ -232,9 +232,9 @@ fn words(block: &[u8]) -> Vec<u16> {
 }
 
 impl OffWay for Conversation<'_> {
-    fn send_off(&mut self, session: &mut Session) -> Result<(), Ended> {
-        let safe = session.endpoint.hand_out_off(session.now());
-        let health = session.endpoint.health();
+    fn send_off(&mut self, connection: &mut Connection) -> Result<(), Ended> {
+        let safe = connection.endpoint.hand_out_off(connection.now());
+        let health = connection.endpoint.health();
         let mut not_taken = |trouble: Trouble| match trouble {
             Trouble::Ended(ended) => Err(ended),
             Trouble::Refused(problem) | Trouble::Corrupt(problem) => {
@@ -243,35 +243,35 @@ impl OffWay for Conversation<'_> {
                 Ok(false)
             }
         };
-        let whole = self.write(session, &safe);
+        let whole = self.write(connection, &safe);
         if whole.map_or_else(&mut not_taken, |()| Ok(true))? {
             return Ok(());
         }
         // Some instruments refuse a block for the sake of one value in it: each by itself then, whatever becomes of the others.
         let mut all = true;
         for (set, value) in safe {
-            let own = self.blocks.put_one(session.endpoint.profile(), set, value);
+            let own = self.blocks.put_one(connection.endpoint.profile(), set, value);
             let Some((table, address, registers)) = own else { continue };
             let taken = self.wire.write(table, address, &registers);
             all &= taken.map_or_else(&mut not_taken, |()| Ok(true))?;
         }
         if !all {
-            session.endpoint.refused();
+            connection.endpoint.refused();
         }
         Ok(())
     }
 
-    fn be_patient(&mut self, session: &Session) {
-        let limit = session.endpoint.profile().description.link.response_timeout_ms;
+    fn be_patient(&mut self, connection: &Connection) {
+        let limit = connection.endpoint.profile().description.link.response_timeout_ms;
         self.wire.wait_up_to(limit.max(OFF_ANSWER_MS));
     }
 
-    fn read_state(&mut self, session: &mut Session) -> Result<(), Ended> {
-        let mut regular = polls(session).into_iter().filter(|(_, poll)| poll.rate_hz.is_some());
-        regular.try_for_each(|(frame, poll)| self.read(session, frame, &poll))
+    fn read_state(&mut self, connection: &mut Connection) -> Result<(), Ended> {
+        let mut regular = polls(connection).into_iter().filter(|(_, poll)| poll.rate_hz.is_some());
+        regular.try_for_each(|(frame, poll)| self.read(connection, frame, &poll))
     }
 }
 
-fn polls(session: &Session) -> Vec<(FrameId, Poll)> {
-    session.endpoint.profile().polls().map(|(frame, poll)| (frame, poll.clone())).collect()
+fn polls(connection: &Connection) -> Vec<(FrameId, Poll)> {
+    connection.endpoint.profile().polls().map(|(frame, poll)| (frame, poll.clone())).collect()
 }

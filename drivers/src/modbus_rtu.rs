@@ -6,24 +6,23 @@
 //! of its own: an exchange has the line to itself. What takes set-points has a line of its own, so that
 //! nothing holds up an 'off'.
 
-use super::ended::{BAD_IN_A_ROW, Closed, Ended};
+use super::connection::{Connection, Spawned};
+use super::ended::{BAD_IN_A_ROW, Ended};
 use super::modbus::{Blocks, Conversation, Registers, Trouble};
 use super::off::{OFF_WAITS_MS, PendingOff};
 use super::serial::{Line, SharedLine};
-use super::session::Session;
 use super::setup::InstrumentSetup;
 use instruments::codec::modbus_rtu::{self as rtu, Request, RtuError};
 use instruments::schema::{Stream, Table};
 use std::convert::Infallible;
-use std::thread::JoinHandle;
 use std::time::{Duration, Instant};
 
 /// Tries to stop a stream that a crashed client left on.
 const STOP_TRIES: u32 = 10;
 
 /// Starts the thread of one instrument.
-pub(crate) fn spawn(instrument: &InstrumentSetup, session: Session) -> Result<JoinHandle<Closed>, Ended> {
-    let link = session.endpoint.profile().description.link.clone();
+pub(crate) fn spawn(instrument: &InstrumentSetup, connection: Connection) -> Spawned {
+    let link = connection.endpoint.profile().description.link.clone();
     let path = instrument.address.strip_prefix("rtu:").unwrap_or(&instrument.address).to_string();
     let rate_hz = instrument.rate_hz;
     let unit = instrument.unit.or(link.unit).unwrap_or(1);
@@ -31,26 +30,26 @@ pub(crate) fn spawn(instrument: &InstrumentSetup, session: Session) -> Result<Jo
     if let Some(late) = super::serial::latency_timer_ms(&path).filter(|&ms| ms > 2) {
         tracing::warn!(path, "the adapter holds bytes back for up to {late} ms; set its latency_timer to 1");
     }
-    session.spawn(move |session| {
+    connection.spawn(move |connection| {
         let mut wire = Rtu::open(&path, baud, link.line_format(), unit, link.response_timeout_ms)?;
-        wire.pending_off = session.pending_off.clone();
-        let health = session.endpoint.health();
+        wire.pending_off = connection.pending_off.clone();
+        let health = connection.endpoint.health();
         health.count(&health.connections);
-        let stream = session.endpoint.profile().description.stream.clone();
+        let stream = connection.endpoint.profile().description.stream.clone();
         if let Some(stream) = stream.as_ref().filter(|stream| stream.stop_before_open) {
             wire.stop_stream(stream)?;
         }
-        if !session.is_first() && session.endpoint.owes_off() {
+        if !connection.is_first() && connection.endpoint.owes_off() {
             // Sent before the line is listened to: nobody knows how long it will be heard.
-            wire.send_unanswered_off(session)?;
+            wire.send_unanswered_off(connection)?;
         }
         // Whatever an earlier connection was still owed comes now or never.
         let longest = link.patience();
         wire.line.with(|line| line.drain(longest, 10 * longest, &PendingOff::default()))?;
-        let conversation = Conversation::begin(session, &mut wire)?;
+        let conversation = Conversation::begin(connection, &mut wire)?;
         match stream {
-            None => conversation.go_on(session, rate_hz),
-            Some(stream) => wire.listen(session, &stream),
+            None => conversation.go_on(connection, rate_hz),
+            Some(stream) => wire.listen(connection, &stream),
         }
     })
 }
@@ -82,9 +81,9 @@ impl Rtu {
     }
 
     /// Writes the safe set-points, every block of them, and needs no answer. The 'off' that is answered and read back follows.
-    fn send_unanswered_off(&mut self, session: &Session) -> Result<(), Ended> {
-        let profile = session.endpoint.profile();
-        let off = Blocks::of(profile).put(profile, &session.endpoint.safe_set_points());
+    fn send_unanswered_off(&mut self, connection: &Connection) -> Result<(), Ended> {
+        let profile = connection.endpoint.profile();
+        let off = Blocks::of(profile).put(profile, &connection.endpoint.safe_set_points());
         for (n, (block, words)) in off.iter().enumerate() {
             if n > 0 {
                 // One at a time has the line: where there is an answer to the one before, it is let through.
@@ -159,9 +158,9 @@ impl Rtu {
     }
 
     /// Starts the stream and hands over its frames until something is wrong.
-    fn listen(&mut self, session: &mut Session, stream: &Stream) -> Result<Infallible, Ended> {
+    fn listen(&mut self, connection: &mut Connection, stream: &Stream) -> Result<Infallible, Ended> {
         self.start_stream(stream)?;
-        super::stream::listen(session, stream, false, &mut |buffer, deadline| {
+        super::stream::listen(connection, stream, false, &mut |buffer, deadline| {
             self.line.with(|line| line.read(buffer, deadline))
         })?;
         self.stop_stream(stream)?;
@@ -249,7 +248,7 @@ mod tests {
         let instrument = InstrumentSetup::new("muprime-amplifier", "rtu:pty");
         let (endpoint, _port) = Endpoint::amplifier(profile, &instrument).unwrap();
         let (ready, _opened) = std::sync::mpsc::sync_channel(1);
-        let session = Session::new(endpoint, Instant::now(), Arc::default(), ready);
+        let connection = Connection::new(endpoint, Instant::now(), Arc::default(), ready);
         let (mut instrument, driver) = TTYPort::pair().unwrap();
         let line = SharedLine::open(&driver.name().unwrap(), 115_200, "8N1").unwrap();
         let mut wire = Rtu {
@@ -260,7 +259,7 @@ mod tests {
             silence: 1e-3,
             pending_off: PendingOff::default(),
         };
-        wire.send_unanswered_off(&session).unwrap();
+        wire.send_unanswered_off(&connection).unwrap();
         instrument.set_timeout(Duration::from_millis(50)).unwrap();
         let (mut heard, mut buffer) = (Vec::new(), [0; 256]);
         while let Ok(count) = instrument.read(&mut buffer) {

@@ -5,10 +5,10 @@
 //! issue 324), so every request has one here, and after any of them passes the connection is dropped
 //! and made anew. An answer that comes late then finds no socket: it can never become a force.
 
-use super::ended::{AddressError, Closed, Ended};
+use super::connection::{Connection, Spawned};
+use super::ended::{AddressError, Ended};
 use super::modbus::{Conversation, Registers, Trouble};
 use super::off::{LOOK_EVERY, PendingOff};
-use super::session::Session;
 use super::setup::InstrumentSetup;
 use super::trace::Traced;
 use instruments::schema::Table;
@@ -16,27 +16,26 @@ use realtime::clock::Clock;
 use realtime::ports::Nanos;
 use std::future::Future;
 use std::net::{SocketAddr, ToSocketAddrs};
-use std::thread::JoinHandle;
 use std::time::Duration;
 use tokio::runtime::Runtime;
 use tokio_modbus::client::{Context, Reader, Writer, tcp};
 use tokio_modbus::prelude::Slave;
 
 /// Starts the thread of one instrument.
-pub(crate) fn spawn(instrument: &InstrumentSetup, session: Session) -> Result<JoinHandle<Closed>, Ended> {
-    let link = &session.endpoint.profile().description.link;
+pub(crate) fn spawn(instrument: &InstrumentSetup, connection: Connection) -> Spawned {
+    let link = &connection.endpoint.profile().description.link;
     let address = resolve(&instrument.address, link.port)?;
     let unit = instrument.unit.or(link.unit).unwrap_or(255);
     let (connect_ms, answer_ms) = (link.connect_timeout_ms, link.response_timeout_ms);
     let rate_hz = instrument.rate_hz;
     let runtime = tokio::runtime::Builder::new_current_thread().enable_all().build()?;
-    session.spawn(move |session| {
-        let clock = session.clock.clock().clone();
+    connection.spawn(move |connection| {
+        let clock = connection.clock.clock().clone();
         let mut wire = Tcp::connect((&runtime, &clock), address, unit, connect_ms, answer_ms)?;
-        wire.pending_off = session.pending_off.clone();
-        let health = session.endpoint.health();
+        wire.pending_off = connection.pending_off.clone();
+        let health = connection.endpoint.health();
         health.count(&health.connections);
-        Conversation::begin(session, &mut wire)?.go_on(session, rate_hz)
+        Conversation::begin(connection, &mut wire)?.go_on(connection, rate_hz)
     })
 }
 

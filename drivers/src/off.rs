@@ -4,11 +4,11 @@
 //! drops [`crate::Links`]. A link that is down at that moment is reopened for the purpose. The driver does
 //! not report 'off' without reading it back.
 
+use super::connection::Connection;
 use super::ended::Ended;
 pub use super::ended::OFF_WITHIN;
 use super::mailbox::Mailbox;
 use super::ports::SetPoint;
-use super::session::Session;
 use realtime::clock::Clock;
 use realtime::ports::Nanos;
 use std::sync::Arc;
@@ -54,53 +54,53 @@ impl PendingOff {
 /// What a transport can do for an 'off'. It fails only where the connection carries nothing more.
 pub trait OffWay {
     /// Sends every safe set-point, whatever became of the one before. What was refused it tells the endpoint.
-    fn send_off(&mut self, session: &mut Session) -> Result<(), Ended>;
+    fn send_off(&mut self, connection: &mut Connection) -> Result<(), Ended>;
 
     /// From now on answers are waited for as long as [`OFF_ANSWER_MS`], where the profile allows less.
-    fn be_patient(&mut self, session: &Session);
+    fn be_patient(&mut self, connection: &Connection);
 
     /// Gets the next state of the instrument into the endpoint.
-    fn read_state(&mut self, session: &mut Session) -> Result<(), Ended>;
+    fn read_state(&mut self, connection: &mut Connection) -> Result<(), Ended>;
 }
 
 /// Switches an instrument off and reads it back.
 ///
 /// # Errors
 /// The connection carries nothing more, or the time is over and the instrument has not shown 'off'.
-pub fn switch_off(session: &mut Session, way: &mut dyn OffWay) -> Result<(), Ended> {
-    if !session.endpoint.is_actuator() {
+pub fn switch_off(connection: &mut Connection, way: &mut dyn OffWay) -> Result<(), Ended> {
+    if !connection.endpoint.is_actuator() {
         return Ok(());
     }
-    way.be_patient(session);
+    way.be_patient(connection);
     loop {
-        way.send_off(session)?;
-        way.read_state(session)?;
-        if session.endpoint.reads_off() {
+        way.send_off(connection)?;
+        way.read_state(connection)?;
+        if connection.endpoint.reads_off() {
             return Ok(());
         }
-        if session.off_time_over() {
+        if connection.off_time_over() {
             return Err(Ended::StillOn);
         }
-        session.sleep_until(Some(session.now().plus(Nanos(AGAIN.as_nanos() as u64))));
+        connection.sleep_until(Some(connection.now().plus(Nanos(AGAIN.as_nanos() as u64))));
     }
 }
 
 /// The end of a conversation whose thread is to stop: off, read back.
-pub fn at_the_end(session: &mut Session, way: &mut dyn OffWay) -> Ended {
-    switch_off(session, way).err().unwrap_or(Ended::Stopped)
+pub fn at_the_end(connection: &mut Connection, way: &mut dyn OffWay) -> Ended {
+    switch_off(connection, way).err().unwrap_or(Ended::Stopped)
 }
 
 /// The start of a conversation after a lost one: an owed 'off' leaves before any request.
 ///
 /// # Errors
 /// The connection carries nothing more.
-pub fn at_the_beginning(session: &mut Session, way: &mut dyn OffWay) -> Result<(), Ended> {
-    if session.is_first() || !session.endpoint.owes_off() {
+pub fn at_the_beginning(connection: &mut Connection, way: &mut dyn OffWay) -> Result<(), Ended> {
+    if connection.is_first() || !connection.endpoint.owes_off() {
         Ok(())
-    } else if session.stopping() {
-        switch_off(session, way)
+    } else if connection.stopping() {
+        switch_off(connection, way)
     } else {
-        way.send_off(session)
+        way.send_off(connection)
     }
 }
 

@@ -1,7 +1,7 @@
 //! Frames that come by themselves: bytes in, samples out, whatever carries them.
 
+use super::connection::{Connection, LONGEST_SLEEP};
 use super::ended::Ended;
-use super::session::{LONGEST_SLEEP, Session};
 use instruments::codec::stream::Cutter;
 use instruments::schema::Stream;
 use std::sync::atomic::Ordering;
@@ -30,8 +30,8 @@ enum Framing {
 }
 
 impl Framing {
-    fn of(session: &Session, stream: &Stream, parted: bool) -> Self {
-        let link = &session.endpoint.profile().description.link;
+    fn of(connection: &Connection, stream: &Stream, parted: bool) -> Self {
+        let link = &connection.endpoint.profile().description.link;
         match (stream.shape(), stream.length) {
             (Some(shape), _) => Self::Binary(Cutter::new(shape)),
             (None, Some(length)) => Self::Datagrams { sync: stream.sync.clone(), length: length.into() },
@@ -47,28 +47,28 @@ impl Framing {
 /// # Errors
 /// Silence for longer than an answer may take, and whatever `read` says.
 pub fn listen(
-    session: &mut Session,
+    connection: &mut Connection,
     stream: &Stream,
     parted: bool,
     read: &mut dyn FnMut(&mut [u8], Instant) -> Result<usize, Ended>,
 ) -> Result<(), Ended> {
-    let (profile, health) = (session.endpoint.profile(), session.endpoint.health());
+    let (profile, health) = (connection.endpoint.profile(), connection.endpoint.health());
     let frame = profile.frame("stream").ok_or_else(|| Ended::Io("the profile has no stream".into()))?;
     let shape = profile.frames()[frame.0].clone();
     let limit_ms = profile.description.link.response_timeout_ms;
     let patience = Duration::from_millis(u64::from(limit_ms));
-    let mut framing = Framing::of(session, stream, parted);
+    let mut framing = Framing::of(connection, stream, parted);
     // The longest datagram that there is.
     let mut buffer = vec![0; if parted { 65_536 } else { 1024 }];
     let (mut skipped, mut last) = (0, Instant::now());
-    while !session.stopping() {
+    while !connection.stopping() {
         let count = read(&mut buffer, Instant::now() + LONGEST_SLEEP)?;
-        let arrived = session.now();
+        let arrived = connection.now();
         let mut outcome = Ok(());
         let mut take = |bytes: &[u8]| {
             last = Instant::now();
             if outcome.is_ok() {
-                outcome = session.endpoint.frame(frame, bytes, arrived);
+                outcome = connection.endpoint.frame(frame, bytes, arrived);
             }
         };
         match &mut framing {
@@ -109,7 +109,7 @@ pub fn listen(
         }
         outcome?;
         if health.report().samples > 0 {
-            session.tell(Ok(()));
+            connection.tell(Ok(()));
         }
         if last.elapsed() > patience {
             return Err(Ended::Timeout(limit_ms));

@@ -5,11 +5,11 @@
 //! sends without a request are removed before the driver looks for an answer: they must never be taken for
 //! one. A binary answer is framed by its length, since its bytes may look like the end of a line.
 
-use super::ended::{BAD_IN_A_ROW, Closed, Ended};
+use super::connection::{Connection, Periodic, Spawned};
+use super::ended::{BAD_IN_A_ROW, Ended};
 use super::endpoint::Due;
 use super::off::{self, OFF_ANSWER_MS, OffWay};
 use super::remedy;
-use super::session::{Periodic, Session};
 use super::setup::InstrumentSetup;
 use super::stream::first_line;
 use super::transport::{Address, Transport};
@@ -20,7 +20,6 @@ use instruments::schema::{Init, Link, LinkKind, Query, Stream};
 use instruments::{FrameId, Profile, SetId};
 use std::collections::HashMap;
 use std::convert::Infallible;
-use std::thread::JoinHandle;
 use std::time::{Duration, Instant};
 
 /// An unchanged set-point is sent again after this long.
@@ -31,27 +30,27 @@ const AFTER_A_BLOCK: Duration = Duration::from_micros(1500);
 const COMMAND_RATE_HZ: f64 = 500.0;
 
 /// Starts the thread of one instrument.
-pub(crate) fn spawn(instrument: &InstrumentSetup, session: Session) -> Result<JoinHandle<Closed>, Ended> {
-    let link = session.endpoint.profile().description.link.clone();
+pub(crate) fn spawn(instrument: &InstrumentSetup, connection: Connection) -> Spawned {
+    let link = connection.endpoint.profile().description.link.clone();
     let at = Address::of(&instrument.address, &link, instrument.baud)?;
     let rate_hz = instrument.rate_hz;
-    session.spawn(move |session| {
+    connection.spawn(move |connection| {
         let transport = at.open(Duration::from_millis(u64::from(link.connect_timeout_ms)))?;
-        let health = session.endpoint.health();
+        let health = connection.endpoint.health();
         health.count(&health.connections);
         let mut talk = Talk::new(transport, link.clone());
-        if !session.is_first() && session.endpoint.owes_off() {
+        if !connection.is_first() && connection.endpoint.owes_off() {
             // Sent before anything is listened to: nobody knows how long the line will carry.
-            talk.send_unanswered_off(session)?;
+            talk.send_unanswered_off(connection)?;
             talk.settle()?;
         }
-        if let Some(stream) = session.endpoint.profile().description.stream.clone() {
-            return talk.listen(session, &stream);
+        if let Some(stream) = connection.endpoint.profile().description.stream.clone() {
+            return talk.listen(connection, &stream);
         }
-        off::at_the_beginning(session, &mut talk)?;
-        talk.initialise(session)?;
-        talk.read_state(session)?;
-        talk.go_on(session, rate_hz)
+        off::at_the_beginning(connection, &mut talk)?;
+        talk.initialise(connection)?;
+        talk.read_state(connection)?;
+        talk.go_on(connection, rate_hz)
     })
 }
 
@@ -122,11 +121,11 @@ impl Talk {
     }
 
     /// Takes whole lines that came unasked out of what came. Returns whether one was an alarm.
-    fn unasked(&mut self, session: &mut Session) {
+    fn unasked(&mut self, connection: &mut Connection) {
         for alarm in &self.alarms {
             while let Some((at, length)) = find(alarm, &self.came, self.link.rx_end().as_bytes()) {
                 let line: Vec<u8> = self.came.drain(at..at + length).collect();
-                session.endpoint.alarm(String::from_utf8_lossy(&line).trim());
+                connection.endpoint.alarm(String::from_utf8_lossy(&line).trim());
             }
         }
     }
@@ -139,38 +138,38 @@ impl Talk {
     }
 
     /// A stream that runs by itself: only its start is sent.
-    fn listen(&mut self, session: &mut Session, stream: &Stream) -> Result<Infallible, Ended> {
-        if !session.endpoint.profile().description.init.is_empty() {
-            self.initialise(session)?;
+    fn listen(&mut self, connection: &mut Connection, stream: &Stream) -> Result<Infallible, Ended> {
+        if !connection.endpoint.profile().description.init.is_empty() {
+            self.initialise(connection)?;
         }
         // Each datagram is whole.
         let parted = matches!(self.transport, Transport::Udp(..));
-        super::stream::listen(session, stream, parted, &mut |buffer, deadline| {
+        super::stream::listen(connection, stream, parted, &mut |buffer, deadline| {
             self.transport.read(buffer, deadline)
         })?;
         Err(Ended::Stopped)
     }
 
     /// Before a question nothing may be left of earlier answers.
-    fn clear(&mut self, session: &mut Session) -> Result<(), Ended> {
+    fn clear(&mut self, connection: &mut Connection) -> Result<(), Ended> {
         while self.take(Instant::now())? {}
-        self.unasked(session);
+        self.unasked(connection);
         self.came.clear();
         Ok(())
     }
 
     /// The next line, without its end, that is no unsolicited one.
-    fn line(&mut self, session: &mut Session) -> Result<String, Ended> {
+    fn line(&mut self, connection: &mut Connection) -> Result<String, Ended> {
         let end = self.link.rx_end().to_owned().into_bytes();
         let mut deadline = Instant::now() + self.limit();
         loop {
-            self.unasked(session);
+            self.unasked(connection);
             if let Some(line) = first_line(&mut self.came, &end)? {
                 return Ok(String::from_utf8_lossy(&line).trim().to_string());
             }
-            if !self.take(session.pending_off.look(&mut deadline))? && Instant::now() >= deadline {
+            if !self.take(connection.pending_off.look(&mut deadline))? && Instant::now() >= deadline {
                 return Err(match self.came.is_empty() {
-                    true => Ended::Timeout(session.pending_off.limit_ms(self.patience_ms)),
+                    true => Ended::Timeout(connection.pending_off.limit_ms(self.patience_ms)),
                     false => Ended::Cut(remedy::unended(&self.came, &end, &self.request)),
                 });
             }
@@ -179,14 +178,14 @@ impl Talk {
 
     /// A binary answer, framed by its length; `None` where more came than that: a line that came
     /// unasked may then stand in the middle of it.
-    fn block(&mut self, session: &mut Session, length: usize) -> Result<Option<Vec<u8>>, Ended> {
+    fn block(&mut self, connection: &mut Connection, length: usize) -> Result<Option<Vec<u8>>, Ended> {
         let mut deadline = Instant::now() + self.limit();
         loop {
-            self.unasked(session);
+            self.unasked(connection);
             if self.came.len() < length {
-                if !self.take(session.pending_off.look(&mut deadline))? && Instant::now() >= deadline {
+                if !self.take(connection.pending_off.look(&mut deadline))? && Instant::now() >= deadline {
                     return Err(match self.came.len() {
-                        0 => Ended::Timeout(session.pending_off.limit_ms(self.patience_ms)),
+                        0 => Ended::Timeout(connection.pending_off.limit_ms(self.patience_ms)),
                         n => Ended::Cut(format!(
                             "{n} bytes came in place of {length}: {}",
                             remedy::shown(&self.came)
@@ -210,10 +209,10 @@ impl Talk {
     }
 
     /// Writes the safe set-points and waits for no answer. The 'off' that is answered and read back follows.
-    fn send_unanswered_off(&mut self, session: &Session) -> Result<(), Ended> {
+    fn send_unanswered_off(&mut self, connection: &Connection) -> Result<(), Ended> {
         self.send("")?;
-        for (set, value) in session.endpoint.safe_set_points() {
-            let profile = session.endpoint.profile();
+        for (set, value) in connection.endpoint.safe_set_points() {
+            let profile = connection.endpoint.profile();
             if let Some((line, _)) = profile.line(set, value, &|other| self.newest(profile, other)) {
                 self.send(&line)?;
             }
@@ -221,12 +220,12 @@ impl Talk {
         Ok(())
     }
 
-    fn initialise(&mut self, session: &mut Session) -> Result<(), Ended> {
+    fn initialise(&mut self, connection: &mut Connection) -> Result<(), Ended> {
         // A socket is new with every connection: no line is incomplete there.
         if matches!(self.link.kind, LinkKind::Serial | LinkKind::Scpi) {
             self.settle()?;
         }
-        for init in session.endpoint.profile().description.init.clone() {
+        for init in connection.endpoint.profile().description.init.clone() {
             let send = match &init {
                 Init { send: Some(send), .. } => send,
                 Init { hex: Some(hex), .. } => {
@@ -236,10 +235,10 @@ impl Talk {
                 }
                 _ => continue,
             };
-            self.clear(session)?;
+            self.clear(connection)?;
             self.send(send)?;
             let Some(expected) = &init.expect else { continue };
-            let answer = self.line(session)?;
+            let answer = self.line(connection)?;
             if !expected.iter().any(|start| answer.starts_with(start.as_str())) {
                 return Err(Ended::Refused(format!("`{send}` was answered by `{answer}`: {}", init.text)));
             }
@@ -247,50 +246,50 @@ impl Talk {
         Ok(())
     }
 
-    fn go_on(mut self, session: &mut Session, rate_hz: Option<f64>) -> Result<Infallible, Ended> {
-        session.tell(Ok(()));
-        let now = session.now();
+    fn go_on(mut self, connection: &mut Connection, rate_hz: Option<f64>) -> Result<Infallible, Ended> {
+        connection.tell(Ok(()));
+        let now = connection.now();
         let often = |(frame, query): (FrameId, Query)| {
             (Periodic::new(rate_hz.unwrap_or(query.rate_hz), now), frame, query)
         };
-        let mut asks: Vec<_> = queries(session).into_iter().map(often).collect();
+        let mut asks: Vec<_> = queries(connection).into_iter().map(often).collect();
         let mut commands = Periodic::new(COMMAND_RATE_HZ, now);
         loop {
-            if session.stopping() {
-                return Err(off::at_the_end(session, &mut self));
+            if connection.stopping() {
+                return Err(off::at_the_end(connection, &mut self));
             }
-            let now = session.now();
+            let now = connection.now();
             if commands.is_due(now) {
-                match session.endpoint.due(now) {
+                match connection.endpoint.due(now) {
                     Due::Nothing => {}
-                    Due::SetPoints(set_points) => self.command(session, &set_points)?,
-                    Due::Safe(_) => self.send_off(session)?,
+                    Due::SetPoints(set_points) => self.command(connection, &set_points)?,
+                    Due::Safe(_) => self.send_off(connection)?,
                 }
-                commands.advance(session.now());
+                commands.advance(connection.now());
             }
             for (periodic, frame, query) in &mut asks {
-                if periodic.is_due(session.now()) {
-                    self.ask(session, *frame, query)?;
-                    periodic.advance(session.now());
+                if periodic.is_due(connection.now()) {
+                    self.ask(connection, *frame, query)?;
+                    periodic.advance(connection.now());
                 }
             }
             let next = asks.iter().map(|(periodic, ..)| periodic.due).chain([commands.due]).min();
-            session.sleep_until(next);
+            connection.sleep_until(next);
         }
     }
 
-    fn ask(&mut self, session: &mut Session, frame: FrameId, query: &Query) -> Result<(), Ended> {
-        self.clear(session)?;
+    fn ask(&mut self, connection: &mut Connection, frame: FrameId, query: &Query) -> Result<(), Ended> {
+        self.clear(connection)?;
         self.send(&query.send)?;
         let bytes = match query.length {
             Some(length) => {
-                let block = self.block(session, usize::from(length))?;
+                let block = self.block(connection, usize::from(length))?;
                 block.ok_or_else(|| format!("more than {length} bytes"))
             }
             None => {
-                let line = self.line(session)?;
+                let line = self.line(connection)?;
                 let echo = if line == query.send { ": switch the instrument's echo off" } else { "" };
-                let numbers = session.endpoint.profile().frames()[frame.0].read_line(&line);
+                let numbers = connection.endpoint.profile().frames()[frame.0].read_line(&line);
                 numbers.ok_or_else(|| format!("`{line}`{echo}"))
             }
         };
@@ -298,19 +297,19 @@ impl Talk {
             Ok(bytes) => bytes,
             Err(by) => {
                 let problem = format!("`{}` was answered by {by}", query.send);
-                self.note(session, problem.clone());
+                self.note(connection, problem.clone());
                 // A few bad answers are borne.
                 return if self.bad >= BAD_IN_A_ROW { Err(Ended::Corrupt(problem)) } else { Ok(()) };
             }
         };
         self.bad = 0;
-        let arrived = session.now();
-        session.endpoint.frame(frame, &bytes, arrived)?;
+        let arrived = connection.now();
+        connection.endpoint.frame(frame, &bytes, arrived)?;
         Ok(())
     }
 
-    fn note(&mut self, session: &Session, problem: String) {
-        let health = session.endpoint.health();
+    fn note(&mut self, connection: &Connection, problem: String) {
+        let health = connection.endpoint.health();
         health.count(&health.corrupt_frames);
         health.problem(problem);
         self.bad += 1;
@@ -318,32 +317,32 @@ impl Talk {
 
     /// Sends the loop's command. One that drives or moves ends with the first set-point that is not taken, that comes too
     /// late or that an 'off' has overtaken, and is followed by an 'off'. One that does not goes on to its last set-point.
-    fn command(&mut self, session: &mut Session, set_points: &[(SetId, f64)]) -> Result<(), Ended> {
-        let on = session.endpoint.wants_on();
+    fn command(&mut self, connection: &mut Connection, set_points: &[(SetId, f64)]) -> Result<(), Ended> {
+        let on = connection.endpoint.wants_on();
         let mut all = true;
         for one in set_points {
-            if on && !session.endpoint.still_wanted(session.now()) {
-                return self.send_off(session);
+            if on && !connection.endpoint.still_wanted(connection.now()) {
+                return self.send_off(connection);
             }
-            all &= self.set(session, *one)?;
+            all &= self.set(connection, *one)?;
             if on && !all {
-                session.endpoint.refused();
-                return self.send_off(session);
+                connection.endpoint.refused();
+                return self.send_off(connection);
             }
         }
         if !all {
-            session.endpoint.refused();
+            connection.endpoint.refused();
         }
         if self.bad >= BAD_IN_A_ROW {
-            let last = session.endpoint.health().report().last_problem;
+            let last = connection.endpoint.health().report().last_problem;
             return Err(Ended::Corrupt(format!("set-points are not taken: {last}")));
         }
         Ok(())
     }
 
     /// Sends one set-point. Whether the instrument took it.
-    fn set(&mut self, session: &mut Session, (set, value): (SetId, f64)) -> Result<bool, Ended> {
-        let profile = session.endpoint.profile();
+    fn set(&mut self, connection: &mut Connection, (set, value): (SetId, f64)) -> Result<bool, Ended> {
+        let profile = connection.endpoint.profile();
         self.newest.insert(set, value);
         let newest = |other| self.newest(profile, other);
         let Some((line, answer)) = profile.line(set, value, &newest) else { return Ok(true) };
@@ -352,20 +351,20 @@ impl Talk {
             return Ok(true);
         }
         self.sent.remove(&set);
-        self.clear(session)?;
+        self.clear(connection)?;
         self.send(&line)?;
         if let Some(start) = answer {
-            let answered = self.line(session)?;
+            let answered = self.line(connection)?;
             if !answered.starts_with(&start) || (start.is_empty() && number(&answered).is_none()) {
-                self.note(session, format!("`{line}` was answered by `{answered}`"));
+                self.note(connection, format!("`{line}` was answered by `{answered}`"));
                 return Ok(false);
             }
         }
         if let Some(query) = self.link.error_query.clone() {
             self.send(&query.send)?;
-            let answered = self.line(session)?;
+            let answered = self.line(connection)?;
             if !query.ok.iter().any(|ok| answered.starts_with(ok.as_str())) {
-                self.note(session, format!("`{line}` gave the error `{answered}`"));
+                self.note(connection, format!("`{line}` gave the error `{answered}`"));
                 return Ok(false);
             }
         }
@@ -375,38 +374,38 @@ impl Talk {
 }
 
 impl OffWay for Talk {
-    fn send_off(&mut self, session: &mut Session) -> Result<(), Ended> {
-        let safe = session.endpoint.hand_out_off(session.now());
+    fn send_off(&mut self, connection: &mut Connection) -> Result<(), Ended> {
+        let safe = connection.endpoint.hand_out_off(connection.now());
         let patience_ms = self.patience_ms;
-        self.be_patient(session);
+        self.be_patient(connection);
         self.sent.clear();
         let mut all = true;
         for one in safe {
             // An answer that stays away is not waited for twice, and keeps nothing from being sent.
-            all &= match self.set(session, one) {
+            all &= match self.set(connection, one) {
                 Ok(taken) => taken,
                 Err(Ended::Timeout(_) | Ended::Cut(_) | Ended::Corrupt(_)) => false,
                 Err(ended) => return Err(ended),
             };
         }
         if !all {
-            session.endpoint.refused();
+            connection.endpoint.refused();
         }
         self.patience_ms = patience_ms;
         Ok(())
     }
 
-    fn be_patient(&mut self, _session: &Session) {
+    fn be_patient(&mut self, _connection: &Connection) {
         self.patience_ms = self.link.response_timeout_ms.max(OFF_ANSWER_MS);
     }
 
-    fn read_state(&mut self, session: &mut Session) -> Result<(), Ended> {
-        queries(session).into_iter().try_for_each(|(frame, query)| self.ask(session, frame, &query))
+    fn read_state(&mut self, connection: &mut Connection) -> Result<(), Ended> {
+        queries(connection).into_iter().try_for_each(|(frame, query)| self.ask(connection, frame, &query))
     }
 }
 
-fn queries(session: &Session) -> Vec<(FrameId, Query)> {
-    session.endpoint.profile().queries().map(|(frame, query)| (frame, query.clone())).collect()
+fn queries(connection: &Connection) -> Vec<(FrameId, Query)> {
+    connection.endpoint.profile().queries().map(|(frame, query)| (frame, query.clone())).collect()
 }
 
 #[cfg(test)]
@@ -421,16 +420,16 @@ mod tests {
         let address = listener.local_addr().unwrap();
         let (endpoint, mut port) = amplifier();
         let (ready, _opened) = std::sync::mpsc::sync_channel(1);
-        let mut session = Session::new(endpoint, Instant::now(), std::sync::Arc::default(), ready);
+        let mut connection = Connection::new(endpoint, Instant::now(), std::sync::Arc::default(), ready);
         port.push(on(1, u64::MAX));
-        session.endpoint.due(session.now());
+        connection.endpoint.due(connection.now());
         port.push(DriveSetPoint { enable: false, ..on(2, u64::MAX) });
-        let mut link = session.endpoint.profile().description.link.clone();
+        let mut link = connection.endpoint.profile().description.link.clone();
         link.response_timeout_ms = 3_600_000;
         let transport = Transport::Tcp(TcpStream::connect(address).unwrap(), String::new());
         let mut talk = Talk::new(transport, link);
         let cut = Err(Ended::Timeout(off::OFF_WAITS_MS));
-        assert_eq!(talk.line(&mut session), cut);
-        assert_eq!(talk.block(&mut session, 4).map(|_| String::new()), cut);
+        assert_eq!(talk.line(&mut connection), cut);
+        assert_eq!(talk.block(&mut connection, 4).map(|_| String::new()), cut);
     }
 }

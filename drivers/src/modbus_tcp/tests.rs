@@ -1,6 +1,7 @@
 //! 'Off' over TCP on this machine: an instrument that refuses a part of it, and one whose connection is lost.
 
 use super::*;
+use crate::ended::Closed;
 use crate::endpoint::Endpoint;
 use crate::endpoint::tests::{DriveSetPoint, on, state};
 use crate::ports::AmplifierPort;
@@ -9,6 +10,7 @@ use std::net::{TcpListener, TcpStream};
 use std::sync::atomic::{AtomicBool, Ordering};
 use std::sync::mpsc::{Receiver, Sender, channel, sync_channel};
 use std::sync::{Arc, Mutex};
+use std::thread::JoinHandle;
 use std::time::Instant;
 
 /// Whatever hangs fails instead.
@@ -105,8 +107,8 @@ fn driving(
     let (endpoint, mut port) = Endpoint::amplifier(profile, &InstrumentSetup::new("", "")).unwrap();
     let (ready, opened) = sync_channel(1);
     let stop = Arc::<AtomicBool>::default();
-    let session = Session::new(endpoint, Instant::now(), Arc::clone(&stop), ready);
-    let thread = spawn(&InstrumentSetup::new("muprime-amplifier", address), session).unwrap();
+    let connection = Connection::new(endpoint, Instant::now(), Arc::clone(&stop), ready);
+    let thread = spawn(&InstrumentSetup::new("muprime-amplifier", address), connection).unwrap();
     assert_eq!(opened.recv_timeout(PATIENCE), Ok(Ok(())));
     port.push(on(1, u64::MAX));
     let on = |one: &Frame| matches!(one, Frame::Write(_, 100, registers) if registers[3] == 1);

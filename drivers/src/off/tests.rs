@@ -35,60 +35,60 @@ impl Instrument {
 }
 
 impl OffWay for Instrument {
-    fn send_off(&mut self, session: &mut Session) -> Result<(), Ended> {
+    fn send_off(&mut self, connection: &mut Connection) -> Result<(), Ended> {
         self.did.push(Did::Off);
         if self.offs() >= self.breaks_at {
             return Err(Ended::Io("the wire broke".into()));
         }
-        let safe = session.endpoint.hand_out_off(session.now());
+        let safe = connection.endpoint.hand_out_off(connection.now());
         assert!(!safe.is_empty());
         Ok(())
     }
 
-    fn be_patient(&mut self, _: &Session) {
+    fn be_patient(&mut self, _: &Connection) {
         self.did.push(Did::Patient);
     }
 
-    fn read_state(&mut self, session: &mut Session) -> Result<(), Ended> {
+    fn read_state(&mut self, connection: &mut Connection) -> Result<(), Ended> {
         self.did.push(Did::Read);
         self.states += 1;
         let on = self.offs() < self.off_from;
-        let arrived = session.now().0;
-        show(&mut session.endpoint, self.states, on, arrived);
+        let arrived = connection.now().0;
+        show(&mut connection.endpoint, self.states, on, arrived);
         Ok(())
     }
 }
 
-fn session_of(endpoint: Endpoint) -> Session {
+fn connection_of(endpoint: Endpoint) -> Connection {
     let (ready, _opened) = std::sync::mpsc::sync_channel(1);
-    Session::new(endpoint, Instant::now(), Arc::default(), ready)
+    Connection::new(endpoint, Instant::now(), Arc::default(), ready)
 }
 
-/// A session whose amplifier was driven, after its first connection.
-fn driven() -> Session {
+/// A connection whose amplifier was driven, after its first connection.
+fn driven() -> Connection {
     let (endpoint, mut port) = amplifier();
-    let mut session = session_of(endpoint);
-    session.tell(Ok(()));
+    let mut connection = connection_of(endpoint);
+    connection.tell(Ok(()));
     port.push(on(1, u64::MAX));
-    session.endpoint.due(session.now());
-    assert!(session.endpoint.owes_off());
-    session
+    connection.endpoint.due(connection.now());
+    assert!(connection.endpoint.owes_off());
+    connection
 }
 
 #[test]
 fn off_is_sent_until_it_is_read_back() {
-    let (mut session, mut instrument) = (driven(), Instrument::new(3));
-    switch_off(&mut session, &mut instrument).unwrap();
+    let (mut connection, mut instrument) = (driven(), Instrument::new(3));
+    switch_off(&mut connection, &mut instrument).unwrap();
     use Did::{Off, Patient, Read};
     assert_eq!(instrument.did, [Patient, Off, Read, Off, Read, Off, Read]);
-    assert!(session.endpoint.reads_off() && !session.endpoint.owes_off());
+    assert!(connection.endpoint.reads_off() && !connection.endpoint.owes_off());
 }
 
 #[test]
 fn an_instrument_that_shows_on_for_good_is_said_to_be_on() {
-    let (mut session, mut instrument) = (driven(), Instrument::new(usize::MAX));
+    let (mut connection, mut instrument) = (driven(), Instrument::new(usize::MAX));
     let began = Instant::now();
-    let ended = at_the_end(&mut session, &mut instrument);
+    let ended = at_the_end(&mut connection, &mut instrument);
     assert!(matches!(ended, Ended::StillOn), "{ended}");
     assert!(
         began.elapsed() >= OFF_WITHIN && instrument.offs() >= 3,
@@ -100,42 +100,42 @@ fn an_instrument_that_shows_on_for_good_is_said_to_be_on() {
 
 #[test]
 fn a_wire_that_breaks_ends_it_and_off_stays_owed() {
-    let (mut session, mut instrument) = (driven(), Instrument::new(usize::MAX));
+    let (mut connection, mut instrument) = (driven(), Instrument::new(usize::MAX));
     instrument.breaks_at = 2;
-    let ended = at_the_end(&mut session, &mut instrument);
+    let ended = at_the_end(&mut connection, &mut instrument);
     assert!(matches!(ended, Ended::Io(_)), "{ended}");
-    assert!(instrument.offs() == 2 && session.endpoint.owes_off());
+    assert!(instrument.offs() == 2 && connection.endpoint.owes_off());
 }
 
 #[test]
 fn an_orderly_end_is_off_read_back() {
-    let (mut session, mut instrument) = (driven(), Instrument::new(1));
-    assert!(matches!(at_the_end(&mut session, &mut instrument), Ended::Stopped));
-    assert!(session.endpoint.reads_off());
+    let (mut connection, mut instrument) = (driven(), Instrument::new(1));
+    assert!(matches!(at_the_end(&mut connection, &mut instrument), Ended::Stopped));
+    assert!(connection.endpoint.reads_off());
 }
 
 #[test]
 fn a_sensor_is_not_switched() {
     let setup = InstrumentSetup::new("muprime-force2", "");
     let (endpoint, _port) = Endpoint::force(profile("muprime-force2").unwrap(), &setup).unwrap();
-    let (mut session, mut instrument) = (session_of(endpoint), Instrument::new(1));
-    assert!(matches!(at_the_end(&mut session, &mut instrument), Ended::Stopped));
+    let (mut connection, mut instrument) = (connection_of(endpoint), Instrument::new(1));
+    assert!(matches!(at_the_end(&mut connection, &mut instrument), Ended::Stopped));
     assert_eq!(instrument.did, []);
 }
 
 #[test]
 fn a_new_connection_begins_with_the_off_that_is_owed() {
-    let mut session = driven();
+    let mut connection = driven();
     let mut instrument = Instrument::new(1);
-    at_the_beginning(&mut session, &mut instrument).unwrap();
+    at_the_beginning(&mut connection, &mut instrument).unwrap();
     assert_eq!(instrument.did, [Did::Off], "the conversation reads it back");
     // The program ends meanwhile: here is the place to see it through.
-    let mut session = driven();
-    session.stop.store(true, Ordering::Release);
+    let mut connection = driven();
+    connection.stop.store(true, Ordering::Release);
     let mut instrument = Instrument::new(2);
-    at_the_beginning(&mut session, &mut instrument).unwrap();
+    at_the_beginning(&mut connection, &mut instrument).unwrap();
     assert_eq!(instrument.did, [Did::Patient, Did::Off, Did::Read, Did::Off, Did::Read]);
-    assert!(session.endpoint.reads_off());
+    assert!(connection.endpoint.reads_off());
     // A broken wire is reported.
     let mut instrument = Instrument { breaks_at: 1, ..Instrument::new(1) };
     assert!(at_the_beginning(&mut driven(), &mut instrument).is_err());
@@ -148,14 +148,14 @@ fn a_connection_that_owes_nothing_begins_with_nothing() {
     show(&mut endpoint, 1, true, 1);
     assert!(endpoint.owes_off());
     let mut instrument = Instrument::new(1);
-    at_the_beginning(&mut session_of(endpoint), &mut instrument).unwrap();
+    at_the_beginning(&mut connection_of(endpoint), &mut instrument).unwrap();
     assert_eq!(instrument.did, []);
     // A later one of an instrument that was never on, whether the program ends or not.
     for stopping in [false, true] {
-        let mut session = session_of(amplifier().0);
-        session.tell(Ok(()));
-        session.stop.store(stopping, Ordering::Release);
-        at_the_beginning(&mut session, &mut instrument).unwrap();
+        let mut connection = connection_of(amplifier().0);
+        connection.tell(Ok(()));
+        connection.stop.store(stopping, Ordering::Release);
+        at_the_beginning(&mut connection, &mut instrument).unwrap();
         assert_eq!(instrument.did, []);
     }
 }

@@ -1,7 +1,7 @@
 //! The life of a link: connect, converse until something is wrong, report to the loop, wait, connect again.
 //!
-//! A session belongs to the link's thread; the loop sees its ports alone and never waits for it. A link that
-//! fails is opened again after a pause that doubles, at once where an 'off' is owed; only a failure of the
+//! A connection belongs to the link's thread; the loop sees its ports alone and never waits for it. A link
+//! that fails is opened again after a pause that doubles, at once where an 'off' is owed; only a failure of the
 //! first connection goes to whoever opened the rig. After a stop it ends once 'off' is read back, or
 //! `OFF_WITHIN` is over.
 
@@ -52,8 +52,11 @@ impl Periodic {
     }
 }
 
+/// The thread of a connection, or why the instrument could not be opened.
+pub type Spawned = Result<JoinHandle<Closed>, Ended>;
+
 /// What every transport's thread starts from.
-pub struct Session {
+pub struct Connection {
     /// Frames to samples, commands to set-points.
     pub endpoint: Endpoint,
     /// Time from the moment that the loop calls zero.
@@ -68,8 +71,8 @@ pub struct Session {
     off_by: Option<Nanos>,
 }
 
-impl Session {
-    /// A session whose thread is not started yet. `ready` takes the outcome of the first connection, once.
+impl Connection {
+    /// A connection whose thread is not started yet. `ready` takes the outcome of the first connection, once.
     pub fn new(
         endpoint: Endpoint,
         clock: impl Into<Clock>,
@@ -119,8 +122,8 @@ impl Session {
     /// Where no thread can be had.
     pub fn spawn(
         mut self,
-        mut converse: impl FnMut(&mut Session) -> Result<Infallible, Ended> + Send + 'static,
-    ) -> Result<JoinHandle<Closed>, Ended> {
+        mut converse: impl FnMut(&mut Connection) -> Result<Infallible, Ended> + Send + 'static,
+    ) -> Spawned {
         let name: String = self.endpoint.profile().id().chars().take(15).collect();
         // At the level of the terminal's default, so that what is shown has its instrument.
         let span = tracing::warn_span!("instrument", id = self.endpoint.profile().id());
@@ -128,7 +131,7 @@ impl Session {
         std::thread::Builder::new().name(name).spawn(run).map_err(Ended::from)
     }
 
-    fn keep_up(&mut self, converse: &mut dyn FnMut(&mut Session) -> Result<Infallible, Ended>) -> Closed {
+    fn keep_up(&mut self, converse: &mut dyn FnMut(&mut Connection) -> Result<Infallible, Ended>) -> Closed {
         let link = &self.endpoint.profile().description.link;
         let first = Duration::from_millis(u64::from(link.backoff_first_ms));
         let longest = Duration::from_millis(u64::from(link.backoff_longest_ms));
@@ -180,7 +183,7 @@ impl Session {
     }
 
     /// One conversation. A panic in it is the end of it, and of nothing else: the next one switches off.
-    fn guarded(&mut self, converse: &mut dyn FnMut(&mut Session) -> Result<Infallible, Ended>) -> Ended {
+    fn guarded(&mut self, converse: &mut dyn FnMut(&mut Connection) -> Result<Infallible, Ended>) -> Ended {
         match std::panic::catch_unwind(AssertUnwindSafe(|| converse(self))) {
             Ok(Ok(never)) => match never {},
             Ok(Err(ended)) => ended,

@@ -27,43 +27,43 @@ fn what_is_periodic_is_due_from_its_time_on() {
     assert_eq!([499, 500, 501].map(|now| periodic.is_due(Nanos(now))), [false, true, true]);
 }
 
-fn alone() -> (Session, Receiver<Result<(), Ended>>) {
+fn alone() -> (Connection, Receiver<Result<(), Ended>>) {
     let (ready, opened) = sync_channel(4);
-    (Session::new(amplifier().0, Instant::now() - Duration::from_secs(3), Arc::default(), ready), opened)
+    (Connection::new(amplifier().0, Instant::now() - Duration::from_secs(3), Arc::default(), ready), opened)
 }
 
 #[test]
 fn the_first_outcome_is_told_once() {
-    let (mut session, opened) = alone();
-    assert!(session.is_first() && session.tell(Ok(())));
-    assert!(!session.is_first() && !session.tell(Err(Ended::Stopped)));
+    let (mut connection, opened) = alone();
+    assert!(connection.is_first() && connection.tell(Ok(())));
+    assert!(!connection.is_first() && !connection.tell(Err(Ended::Stopped)));
     assert_eq!((opened.try_recv(), opened.try_recv().is_err()), (Ok(Ok(())), true));
 }
 
 #[test]
-fn a_session_knows_its_time_and_whether_it_is_to_end() {
-    let (mut session, _opened) = alone();
-    assert!(session.now() >= Nanos(3_000_000_000) && !session.stopping());
-    session.stop.store(true, Ordering::Release);
-    assert!(session.stopping());
+fn a_connection_knows_its_time_and_whether_it_is_to_end() {
+    let (mut connection, _opened) = alone();
+    assert!(connection.now() >= Nanos(3_000_000_000) && !connection.stopping());
+    connection.stop.store(true, Ordering::Release);
+    assert!(connection.stopping());
     let began = Instant::now();
-    assert!(!session.off_time_over(), "it begins with the first question");
-    while !session.off_time_over() {
+    assert!(!connection.off_time_over(), "it begins with the first question");
+    while !connection.off_time_over() {
         assert!(began.elapsed() < PATIENCE);
-        session.sleep_until(None);
+        connection.sleep_until(None);
     }
     assert!(began.elapsed() >= OFF_WITHIN);
 }
 
 #[test]
 fn a_sleep_is_as_long_as_it_may_be() {
-    let (session, _opened) = alone();
+    let (connection, _opened) = alone();
     let slept = |due: Option<Nanos>| {
         let began = Instant::now();
-        session.sleep_until(due);
+        connection.sleep_until(due);
         began.elapsed()
     };
-    let hour = session.now().plus(Nanos(3_600_000_000_000));
+    let hour = connection.now().plus(Nanos(3_600_000_000_000));
     assert!(slept(None) >= LONGEST_SLEEP && slept(Some(hour)) >= LONGEST_SLEEP);
-    assert!(slept(Some(session.now().plus(Nanos(5_000_000)))) >= Duration::from_millis(4));
+    assert!(slept(Some(connection.now().plus(Nanos(5_000_000)))) >= Duration::from_millis(4));
 }

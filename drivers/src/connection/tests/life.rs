@@ -17,7 +17,7 @@ fn io(text: &str) -> Ended {
 }
 
 /// What a conversation does: the so manieth, from 1.
-type Script = dyn FnMut(usize, &mut Session) -> Ended + Send;
+type Script = dyn FnMut(usize, &mut Connection) -> Ended + Send;
 
 /// A link on its thread.
 struct Link {
@@ -42,12 +42,12 @@ impl Link {
         let (ready, opened) = sync_channel(4);
         let times = Arc::new(Mutex::new(Vec::new()));
         let log = Arc::clone(&times);
-        let session = Session::new(endpoint, Instant::now(), Arc::clone(&stop), ready);
-        let thread = session
-            .spawn(move |session| {
+        let connection = Connection::new(endpoint, Instant::now(), Arc::clone(&stop), ready);
+        let thread = connection
+            .spawn(move |connection| {
                 let (began, number) = (Instant::now(), log.lock().unwrap().len() + 1);
                 log.lock().unwrap().push((began, began));
-                let ended = std::panic::catch_unwind(AssertUnwindSafe(|| script(number, session)));
+                let ended = std::panic::catch_unwind(AssertUnwindSafe(|| script(number, connection)));
                 log.lock().unwrap()[number - 1].1 = Instant::now();
                 ended.map_or_else(|cause| std::panic::resume_unwind(cause), Err)
             })
@@ -73,17 +73,17 @@ impl Link {
 }
 
 /// A conversation that works: it gives a sample, which shows whether the output is on.
-fn works(number: usize, session: &mut Session, on: bool) {
-    session.tell(Ok(()));
-    let arrived = session.now().0;
-    show(&mut session.endpoint, number as u16, on, arrived);
+fn works(number: usize, connection: &mut Connection, on: bool) {
+    connection.tell(Ok(()));
+    let arrived = connection.now().0;
+    show(&mut connection.endpoint, number as u16, on, arrived);
 }
 
 /// 'Off' leaves and is read back.
-fn switches_off(number: usize, session: &mut Session) -> Ended {
-    session.endpoint.hand_out_off(session.now());
+fn switches_off(number: usize, connection: &mut Connection) -> Ended {
+    connection.endpoint.hand_out_off(connection.now());
     std::thread::sleep(Duration::from_millis(1));
-    works(number, session, false);
+    works(number, connection, false);
     Ended::Stopped
 }
 
@@ -97,8 +97,8 @@ fn nobody_there_is_told_to_whoever_opens_and_not_tried_again() {
     let setup = InstrumentSetup::new("muprime-force2", "");
     let (endpoint, _port) = Endpoint::force(profile("muprime-force2").unwrap(), &setup).unwrap();
     let (ready, _opened) = sync_channel(1);
-    let session = Session::new(endpoint, Instant::now(), Arc::default(), ready);
-    assert_eq!(session.spawn(|_| Err(io("nobody"))).unwrap().join().unwrap(), Closed::NothingToSwitch);
+    let connection = Connection::new(endpoint, Instant::now(), Arc::default(), ready);
+    assert_eq!(connection.spawn(|_| Err(io("nobody"))).unwrap().join().unwrap(), Closed::NothingToSwitch);
 }
 
 #[test]
@@ -108,8 +108,8 @@ fn an_orderly_end_says_what_was_read_back() {
     let link = Link::start(
         1,
         1,
-        Box::new(|_, session| {
-            session.tell(Ok(()));
+        Box::new(|_, connection| {
+            connection.tell(Ok(()));
             Ended::Stopped
         }),
     );
@@ -121,13 +121,13 @@ fn a_lost_link_is_made_anew_until_it_is_to_end() {
     let link = Link::start(
         1,
         1,
-        Box::new(|number, session| match number {
+        Box::new(|number, connection| match number {
             1..=3 => {
-                works(number, session, false);
+                works(number, connection, false);
                 if number == 2 { Ended::Timeout(50) } else { io("cut") }
             }
             4 => panic!("a fault of {}", "this program"),
-            _ => switches_off(number, session),
+            _ => switches_off(number, connection),
         }),
     );
     assert_eq!((link.closed(), link.conversations()), (Closed::ReadBackOff, 5));
@@ -143,9 +143,9 @@ fn a_link_that_owes_nothing_is_not_made_anew_for_the_end() {
     let link = Link::start(
         60_000,
         60_000,
-        Box::new(|number, session| {
-            works(number, session, false);
-            session.stop.store(true, Ordering::Release);
+        Box::new(|number, connection| {
+            works(number, connection, false);
+            connection.stop.store(true, Ordering::Release);
             io("cut")
         }),
     );
@@ -158,11 +158,11 @@ fn a_link_that_owes_off_is_made_anew_for_the_end() {
     let link = Link::start(
         30_000,
         60_000,
-        Box::new(|number, session| {
+        Box::new(|number, connection| {
             match number {
-                1 => works(number, session, true),
-                2..=4 => session.stop.store(true, Ordering::Release),
-                _ => return switches_off(number, session),
+                1 => works(number, connection, true),
+                2..=4 => connection.stop.store(true, Ordering::Release),
+                _ => return switches_off(number, connection),
             }
             io("cut")
         }),
@@ -175,11 +175,11 @@ fn the_end_waits_for_an_off_no_longer_than_it_may() {
     let link = Link::start(
         1,
         1,
-        Box::new(|number, session| {
+        Box::new(|number, connection| {
             if number == 1 {
-                works(number, session, true);
+                works(number, connection, true);
             }
-            session.stop.store(true, Ordering::Release);
+            connection.stop.store(true, Ordering::Release);
             io("gone for good")
         }),
     );
@@ -194,14 +194,14 @@ fn pauses_double_up_to_the_longest_and_begin_anew_after_a_good_link() {
         let link = Link::start(
             10,
             2000,
-            Box::new(|number, session| match number {
+            Box::new(|number, connection| match number {
                 1 => {
-                    works(number, session, false);
+                    works(number, connection, false);
                     io("cut")
                 }
                 2..=7 => io("nobody"),
                 8 => {
-                    works(number, session, false);
+                    works(number, connection, false);
                     io("cut")
                 }
                 _ => Ended::Stopped,
@@ -222,8 +222,8 @@ fn pauses_double_up_to_the_longest_and_begin_anew_after_a_good_link() {
     let link = Link::start(
         10,
         30,
-        Box::new(|number, session| {
-            session.tell(Ok(()));
+        Box::new(|number, connection| {
+            connection.tell(Ok(()));
             if number < 12 { io("nobody") } else { Ended::Stopped }
         }),
     );
@@ -239,11 +239,11 @@ fn an_owed_off_is_tried_at_once_and_then_with_pauses() {
         let link = Link::start(
             1500,
             1500,
-            Box::new(|number, session| {
+            Box::new(|number, connection| {
                 match number {
-                    1 => works(number, session, true),
+                    1 => works(number, connection, true),
                     2 => {}
-                    _ => return switches_off(number, session),
+                    _ => return switches_off(number, connection),
                 }
                 io("cut")
             }),
@@ -263,8 +263,8 @@ fn a_pause_ends_with_the_program_and_keeps_no_command() {
     let link = Link::start(
         3_600_000,
         3_600_000,
-        Box::new(|number, session| {
-            works(number, session, false);
+        Box::new(|number, connection| {
+            works(number, connection, false);
             io("cut")
         }),
     );
@@ -277,13 +277,13 @@ fn a_pause_ends_with_the_program_and_keeps_no_command() {
     let link = Link::start(
         300,
         300,
-        Box::new(move |number, session| {
+        Box::new(move |number, connection| {
             if number == 1 {
-                works(number, session, false);
+                works(number, connection, false);
                 return io("cut");
             }
-            let _ = sender.send(session.endpoint.due(session.now()));
-            switches_off(number, session)
+            let _ = sender.send(connection.endpoint.due(connection.now()));
+            switches_off(number, connection)
         }),
     );
     assert_eq!(link.opened.recv_timeout(PATIENCE), Ok(Ok(())));
