@@ -1,8 +1,8 @@
 //! The fault list in virtual time: each fault in each phase, its worst reaction beside its bound, and its cause.
 
 use studies::cases::kinds::faults::{Settings, search};
-use studies::validation::faults::bench::STEADY_AT;
 use studies::validation::faults::rows::What;
+use studies::validation::faults::scene::STEADY_AT;
 use studies::validation::faults::{Core, Expect, Moment, Pace, ROWS, Scene, Strike, Tally, run, run_with};
 use tests::rounds;
 

@@ -6,8 +6,8 @@
 use realtime::safety::{Cause, RULES, Rule, Unit};
 use std::collections::{BTreeMap, BTreeSet};
 use std::fmt::Write;
-use studies::validation::faults::bench::STEADY_AT;
-use studies::validation::faults::bench::{RING, T};
+use studies::validation::faults::scene::STEADY_AT;
+use studies::validation::faults::scene::{RING, T};
 use studies::validation::faults::{Expect, Moment, Pace, ROWS, Scene, Strike, Tally, run};
 use tests::file;
 

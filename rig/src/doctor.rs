@@ -185,9 +185,9 @@ impl Rules {
 /// Reads every instrument that can be opened; one that fails keeps none of the others from being read.
 pub fn inspect(setup: &Setup, instruments: &InstrumentsSetup) -> Inspection {
     let epoch = Instant::now();
-    let (all, mut bench) = ports::open(setup, instruments, epoch);
+    let (all, mut ports) = ports::open(setup, instruments, epoch);
     let monitor = StallMonitor::start(realtime::pacing::monotonic_ns());
-    let mut rules = Rules::of(setup, bench.supply.is_some());
+    let mut rules = Rules::of(setup, ports.supply.is_some());
     let mut followed = <[Follow; 9]>::default();
     let counted = || -> Vec<HealthReport> { all.iter().map(Opened::health).collect() };
     let (opened, cycle) = (Instant::now(), Duration::from_nanos(setup.config.limits.timing.cycle.0));
@@ -196,7 +196,7 @@ pub fn inspect(setup: &Setup, instruments: &InstrumentsSetup) -> Inspection {
         deadline = (deadline + cycle).max(Instant::now());
         std::thread::sleep(deadline.saturating_duration_since(Instant::now()));
         let now = Nanos(u64::try_from(epoch.elapsed().as_nanos()).unwrap_or(u64::MAX));
-        let seen = bench.read(now);
+        let seen = ports.read(now);
         rules.step(&seen, now, opened.elapsed() > INSPECTION / 2);
         if opened.elapsed() > SETTLING {
             before.get_or_insert_with(|| (counted(), Instant::now()));
@@ -210,7 +210,7 @@ pub fn inspect(setup: &Setup, instruments: &InstrumentsSetup) -> Inspection {
     let (before, began) = before.unwrap_or_else(|| (after.clone(), opened));
     let seconds = began.elapsed().as_secs_f64();
     let whole = all.iter().all(|o| o.link.is_ok());
-    let last = last.unwrap_or_else(|| bench.read(Nanos(0)));
+    let last = last.unwrap_or_else(|| ports.read(Nanos(0)));
     let found = all.into_iter().zip(before.iter().zip(&after)).map(|(o, (before, after))| Found {
         role: o.role,
         id: o.instrument.profile.clone(),

@@ -12,27 +12,27 @@
 //! | [`imitate`] | which other cause would do as well |
 //! | [`rough`] | sets whose scatter is not what rig.toml states |
 //! | [`form`] | how far a cause may depart from its formula |
-//! | `bench` | fingertip, noise, sizes, and the measurement itself |
+//! | `set_maker` | fingertip, noise, sizes, and the measurement itself |
 //! | `files` | the folders |
 
-mod bench;
 pub mod design;
 mod files;
 pub mod form;
 pub mod imitate;
 pub mod oracle;
 pub mod rough;
+mod set_maker;
 
 use crate::defects::{ALL, Defect, DefectKind, Defects, compatible};
 use crate::noise::Noise;
-pub use bench::SetNoise;
-use bench::{Bench, GAP};
 use design::{Design, Planned};
 use imitate::Imitator;
 use models::condition::Condition;
 use models::pass::Pass;
 use oracle::{Case, Fit};
 use serde::{Deserialize, Serialize};
+pub use set_maker::SetNoise;
+use set_maker::{GAP, SetMaker};
 
 /// What kind of truth a set holds.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
@@ -184,9 +184,9 @@ pub const PAIR_LEAVES: f64 = 0.25;
 /// Passes hidden for scoring.
 const HIDDEN: usize = 100;
 
-/// The bench behind a set, for further passes: what a designed next experiment is tried on.
+/// The maker of a set, for further passes: what a designed next experiment is tried on.
 pub struct SealedRig {
-    bench: Bench,
+    maker: SetMaker,
     defects: Defects,
     noise: Noise,
     pace_s: f64,
@@ -203,8 +203,8 @@ impl SealedRig {
             Planned { condition, replicate: 0, run: self.runs }
         };
         let planned: Vec<Planned> = conditions.iter().enumerate().map(plan).collect();
-        let points = self.bench.circumstances(&planned, true, &mut self.noise);
-        let mut passes = self.bench.measure(&points, &planned, &self.defects, &mut self.noise);
+        let points = self.maker.circumstances(&planned, true, &mut self.noise);
+        let mut passes = self.maker.measure(&points, &planned, &self.defects, &mut self.noise);
         for pass in &mut passes {
             pass.point += self.points as u64;
         }
@@ -225,16 +225,16 @@ pub fn generate_with_rig(seed: u64, stratum: Stratum, ask: Ask) -> (Set, SealedR
     let design = Design::draw(&mut noise);
     let planned = design.plan(&mut noise);
     let hidden = design.hidden(&mut noise, &planned, HIDDEN);
-    let bench = Bench::draw(&mut noise, seed);
+    let maker = SetMaker::draw(&mut noise, seed);
     let kinds = stratum.kinds(&mut noise);
-    let seen = bench.circumstances(&planned, true, &mut noise);
-    let defects = bench.sized(&kinds, &seen, GAP, &mut noise);
-    let passes = bench.measure(&seen, &planned, &defects, &mut noise);
+    let seen = maker.circumstances(&planned, true, &mut noise);
+    let defects = maker.sized(&kinds, &seen, GAP, &mut noise);
+    let passes = maker.measure(&seen, &planned, &defects, &mut noise);
 
-    let data = bench.noise_free(&seen, &defects);
-    let case = bench.case(&data);
+    let data = maker.noise_free(&seen, &defects);
+    let case = maker.case(&data);
     let base = case.fit(&Defects::none(), 8);
-    let truth = case.fit_from(&bench.finger, &defects, 2);
+    let truth = case.fit_from(&maker.finger, &defects, 2);
     let gain = base.chi2 - truth.chi2;
     let (best_single_leaves, imitators) = match ask {
         Ask::Gain => (None, Vec::new()),
@@ -242,11 +242,11 @@ pub fn generate_with_rig(seed: u64, stratum: Stratum, ask: Ask) -> (Set, SealedR
         _ => imitations(&case, &defects.defects, &base, truth.chi2, ask == Ask::AllImitators),
     };
 
-    let seen_hidden = bench.circumstances(&hidden, false, &mut noise);
-    let at_hidden = bench.noise_free(&seen_hidden, &defects);
-    let without = bench.noise_free(&seen_hidden, &Defects::none());
+    let seen_hidden = maker.circumstances(&hidden, false, &mut noise);
+    let at_hidden = maker.noise_free(&seen_hidden, &defects);
+    let without = maker.noise_free(&seen_hidden, &Defects::none());
     // Nominal baseline: docs/contract.md's mu0, from the table's passes without vibration.
-    let mut nominal = bench.nominal;
+    let mut nominal = maker.nominal;
     nominal.mu0 = models::pass::coulomb_coefficient(&passes).unwrap_or(nominal.mu0);
     let label = Label {
         schema: "muprime.sealed/1".to_string(),
@@ -254,13 +254,13 @@ pub fn generate_with_rig(seed: u64, stratum: Stratum, ask: Ask) -> (Set, SealedR
         stratum,
         chi2_gain: gain,
         best_single_leaves,
-        hidden_before_rmse: bench.error(&at_hidden, &nominal),
-        hidden_recalibrated_rmse: bench.error(&at_hidden, &base.finger),
-        hidden_floor_rmse: bench.floor(&at_hidden),
-        true_normal_stiffness_n_per_m: bench.finger.normal_stiffness_n_per_m,
-        true_lateral_stiffness_n_per_m: bench.finger.lateral_stiffness_n_per_m,
-        true_mu0: bench.finger.mu0,
-        noise: bench.scatter,
+        hidden_before_rmse: maker.error(&at_hidden, &nominal),
+        hidden_recalibrated_rmse: maker.error(&at_hidden, &base.finger),
+        hidden_floor_rmse: maker.floor(&at_hidden),
+        true_normal_stiffness_n_per_m: maker.finger.normal_stiffness_n_per_m,
+        true_lateral_stiffness_n_per_m: maker.finger.lateral_stiffness_n_per_m,
+        true_mu0: maker.finger.mu0,
+        noise: maker.scatter,
         design,
         causes: defects.defects.iter().map(cause).collect(),
         imitators,
@@ -271,12 +271,12 @@ pub fn generate_with_rig(seed: u64, stratum: Stratum, ask: Ask) -> (Set, SealedR
         runs: planned.iter().map(|p| p.run + 1).max().unwrap_or(0),
         points: passes.len(),
         defects,
-        bench,
+        maker,
     };
     let set = Set {
-        conditions: rig.bench.conditions(&at_hidden, &hidden),
-        rig_toml: rig.bench.rig_file().to_toml().expect("a sealed set's rig is within every range"),
-        recalibrated_n: rig.bench.ideal(&at_hidden, &base.finger),
+        conditions: rig.maker.conditions(&at_hidden, &hidden),
+        rig_toml: rig.maker.rig_file().to_toml().expect("a sealed set's rig is within every range"),
+        recalibrated_n: rig.maker.ideal(&at_hidden, &base.finger),
         sd_n: at_hidden.sd_n,
         passes,
         truth_n: at_hidden.lateral_n,

@@ -3,7 +3,7 @@
 use super::prelude::*;
 use std::sync::{Arc, Mutex, PoisonError};
 use studies::cases::kinds::faults::{Settings, search};
-use studies::validation::faults::bench::{Scene, run as run_scene};
+use studies::validation::faults::scene::{Scene, run as run_scene};
 use studies::validation::faults::{Pace, Tally};
 
 /// Scenes of the bench, run here or as cases.
@@ -75,7 +75,7 @@ pub fn run(args: Args, json: bool) -> miette::Result<ExitCode> {
     })?;
     bar.finish_and_clear();
     let cpu_s = (realtime::pacing::process_cpu_ns() - cpu_ns) as f64 * 1e-9;
-    let simulated_s = tally.cycles as f64 * studies::validation::faults::bench::T.seconds();
+    let simulated_s = tally.cycles as f64 * studies::validation::faults::scene::T.seconds();
     let speed = simulated_s / cpu_s.max(1e-9);
     if json {
         answer_json(&document(&tally, Some(speed), false));

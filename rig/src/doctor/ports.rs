@@ -31,7 +31,7 @@ impl Opened<'_> {
 }
 
 /// The ports of what could be opened.
-pub struct Bench {
+pub struct OpenPorts {
     force: Box<dyn ForceSensor>,
     /// The amplifier.
     pub amplifier: Option<AmplifierPort>,
@@ -67,7 +67,7 @@ pub fn open<'a>(
     setup: &Setup,
     instruments: &'a InstrumentsSetup,
     epoch: Instant,
-) -> (Vec<Opened<'a>>, Bench) {
+) -> (Vec<Opened<'a>>, OpenPorts) {
     let (mut all, mut forces) = (Vec::new(), Vec::new());
     for own in &instruments.force {
         let opened = open_one(&mut all, ("force", own), epoch, |profile| Endpoint::force(profile, own));
@@ -90,10 +90,10 @@ pub fn open<'a>(
     // A certificate speaks of both axes.
     let whole = all.iter().all(|o| o.link.is_ok());
     let force = if whole { setup.certificates.calibrated(merged) } else { merged };
-    (all, Bench { force, amplifier, stage, supply, contacts })
+    (all, OpenPorts { force, amplifier, stage, supply, contacts })
 }
 
-impl Bench {
+impl OpenPorts {
     /// What the loop would see now.
     pub fn read(&mut self, now: Nanos) -> Observation {
         Observation {

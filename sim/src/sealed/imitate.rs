@@ -5,9 +5,9 @@
 //! and shapes together; and for expensive causes all this on a part of the passes first, the whole table if
 //! that comes near.
 
-use super::bench::NoiseFree;
 use super::form::{Kernel, solved};
 use super::oracle::{Case, Fit, NUISANCES, Theta, moved};
+use super::set_maker::NoiseFree;
 use crate::defects::{ALL, Defect, DefectKind, Defects, Draw, Parameter, Values, compatible};
 use crate::noise::Noise;
 use serde::{Deserialize, Serialize};
@@ -387,8 +387,8 @@ fn bounded_step(kind: &DefectKind, (a, b): &Equations, damping: f64, at: &Unknow
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::sealed::bench::Bench;
     use crate::sealed::design::Design;
+    use crate::sealed::set_maker::SetMaker;
 
     #[test]
     fn a_search_leaves_no_more_than_its_ladder() {
@@ -404,13 +404,13 @@ mod tests {
             let mut noise = Noise::new(seed, "ladder");
             let design = Design::draw(&mut noise);
             let planned = design.plan(&mut noise);
-            let bench = Bench::draw(&mut noise, seed);
-            let points = bench.circumstances(&planned, true, &mut noise);
+            let maker = SetMaker::draw(&mut noise, seed);
+            let points = maker.circumstances(&planned, true, &mut noise);
             let truth = DefectKind::named(name).unwrap();
             let mut values = truth.draw(&mut noise);
             truth.resize(&mut values, 0.7);
-            let data = bench.noise_free(&points, &Defects::one(truth, values));
-            let case = bench.case(&data);
+            let data = maker.noise_free(&points, &Defects::one(truth, values));
+            let case = maker.case(&data);
             let base = case.fit(&Defects::none(), 8);
             let found = case.imitators(&[Defect { kind: truth, values }], &base, 0.0, false);
             for imitator in found.iter().filter(|i| !DEAR.contains(&i.name.as_str())) {

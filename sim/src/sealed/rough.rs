@@ -1,8 +1,8 @@
 //! Sealed sets whose scatter is not what rig.toml states: bad passes, heavy tails, scatter that lasts, shifts
 //! between runs, a repeatability stated too small.
 
-use super::bench::Bench;
 use super::design::{Design, Planned};
+use super::set_maker::SetMaker;
 use crate::defects::{DefectKind, Defects};
 use crate::noise::Noise;
 use models::pass::Pass;
@@ -78,12 +78,12 @@ pub fn rough(seed: u64, kind: Option<&'static DefectKind>, roughness: Roughness)
     };
     let mut planned = design.plan(&mut noise);
     one_clock(&mut planned, design.pace_s);
-    let mut bench = Bench::draw(&mut noise, seed);
-    bench.scatter.tail = 0.0;
-    bench.stated = if roughness == Roughness::Understated { 1.0 / UNDERSTATED } else { 1.0 };
-    let seen = bench.circumstances(&planned, true, &mut noise);
-    let defects = kind.map_or_else(Defects::none, |kind| bench.sized(&[kind], &seen, GAP, &mut noise));
-    let truth = bench.noise_free(&seen, &defects);
+    let mut maker = SetMaker::draw(&mut noise, seed);
+    maker.scatter.tail = 0.0;
+    maker.stated = if roughness == Roughness::Understated { 1.0 / UNDERSTATED } else { 1.0 };
+    let seen = maker.circumstances(&planned, true, &mut noise);
+    let defects = kind.map_or_else(Defects::none, |kind| maker.sized(&[kind], &seen, GAP, &mut noise));
+    let truth = maker.noise_free(&seen, &defects);
 
     let mut own = Noise::new(seed, "rough scatter");
     let n = planned.len();
@@ -107,7 +107,7 @@ pub fn rough(seed: u64, kind: Option<&'static DefectKind>, roughness: Roughness)
     };
     let mut passes: Vec<Pass> = (planned.iter().enumerate())
         .map(|(i, plan)| {
-            let s = bench.scatter;
+            let s = maker.scatter;
             let level = if roughness == Roughness::Runs { 1.0 + RUN_SD * runs[plan.run] } else { 1.0 };
             let repeat = 1.0 + s.pass_relative_sd * deviate(&mut own, 0);
             let lateral = truth.lateral_n[i] * level * repeat + s.force_sd_n * deviate(&mut own, 1);
@@ -115,7 +115,7 @@ pub fn rough(seed: u64, kind: Option<&'static DefectKind>, roughness: Roughness)
             let (far, up) = (own.between(BAD_SD[0], BAD_SD[1]), own.chance(0.5));
             let off =
                 if bad.contains(&i) { far * if up { truth.sd_n[i] } else { -truth.sd_n[i] } } else { 0.0 };
-            let mut pass = bench.row(i, plan, &seen[i], normal.max(1e-3));
+            let mut pass = maker.row(i, plan, &seen[i], normal.max(1e-3));
             pass.lateral_force_n = Some(lateral + off);
             pass
         })
@@ -124,7 +124,7 @@ pub fn rough(seed: u64, kind: Option<&'static DefectKind>, roughness: Roughness)
     bad.sort_unstable();
     passes.truncate(PASSES);
     bad.retain(|point| passes.iter().any(|p| p.point == *point));
-    let rig_toml = bench.rig_file().to_toml().expect("a sealed set's rig is within every range");
+    let rig_toml = maker.rig_file().to_toml().expect("a sealed set's rig is within every range");
     RoughSet { passes, rig_toml, bad }
 }
 
@@ -144,7 +144,7 @@ fn one_clock(planned: &mut [Planned], pace_s: f64) {
 mod tests {
     use super::*;
 
-    /// One seed is one bench: kinds of scatter differ in scatter, by what they say.
+    /// One seed is one maker: kinds of scatter differ in scatter, by what they say.
     #[test]
     fn kinds_of_scatter_do_what_they_say() {
         let plain = rough(7, None, Roughness::Gaussian);

@@ -13,10 +13,10 @@ use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
 /// An operator's hands at the virtual rig: weights to hang on the force sensor, a vibrometer to look with.
 /// What they do reaches the world with the next look at it by an instrument.
 #[derive(Clone, Default)]
-pub struct Hands(Arc<Mutex<Bench>>);
+pub struct Hands(Arc<Mutex<Shared>>);
 
 #[derive(Clone, Copy, Default)]
-struct Bench {
+struct Shared {
     hung_n: [f64; 2],
     free: Laser,
 }
@@ -35,15 +35,15 @@ pub struct Laser {
 impl Hands {
     /// Hangs true forces on the sensor (N), lateral and normal, in place of those before.
     pub fn hang(&self, lateral_n: f64, normal_n: f64) {
-        self.bench().hung_n = [lateral_n, normal_n];
+        self.shared().hung_n = [lateral_n, normal_n];
     }
 
     /// Looks with the vibrometer.
     pub fn look(&self) -> Laser {
-        self.bench().free
+        self.shared().free
     }
 
-    fn bench(&self) -> MutexGuard<'_, Bench> {
+    fn shared(&self) -> MutexGuard<'_, Shared> {
         self.0.lock().unwrap_or_else(PoisonError::into_inner)
     }
 }
@@ -113,7 +113,7 @@ impl WorldPlant {
 impl Plant for WorldPlant {
     fn advance(&mut self, now: Nanos) {
         // Whatever was hung since the last look has been there since then.
-        let [lateral_n, normal_n] = self.hands.bench().hung_n;
+        let [lateral_n, normal_n] = self.hands.shared().hung_n;
         self.world.hung = Forces { lateral_n, normal_n };
         // The earlier of the two first.
         while let Some(due) = [&self.guard, &self.supply_guard].iter().filter_map(|g| g.due()).min()
@@ -130,7 +130,7 @@ impl Plant for WorldPlant {
             }
         }
         self.world.advance_to(now);
-        self.hands.bench().free = Laser {
+        self.hands.shared().free = Laser {
             amplitude_pp_m: self.world.free_amplitude_pp_m(),
             frequency_hz: self.world.truth().frequency_hz,
             time_s: self.world.now().seconds(),

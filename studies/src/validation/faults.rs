@@ -1,17 +1,17 @@
 //! Controller, virtual rig and faults in virtual time, from one seed: each fault of the list strikes in each
 //! phase, and the reaction is compared with its bound.
 //!
-//! `rows` is the list, `bench` runs one scene, `search` draws scenes, tallies many of them
+//! `rows` is the list, `scene` runs one, `search` draws scenes, tallies many of them
 //! and makes a failure small.
 
-pub mod bench;
 pub mod rows;
+pub mod scene;
 pub mod search;
 mod tamper;
 
-pub use bench::{Core, Found, Scene, Strike, run, run_with};
 pub use rows::{Expect, FaultRow, Moment, Pace, ROWS};
 use runs::out;
+pub use scene::{Core, Found, Scene, Strike, run, run_with};
 pub use search::Tally;
 
 /// Worst reactions beside their bounds, in cycles of 1 ms.

@@ -1,7 +1,7 @@
 //! The scene of a seed, the tally of many scenes' reactions, and a failure made small.
 
-use super::bench::{Found, RING, STEADY_AT, Scene, Strike, T, measured_bound, run};
 use super::rows::{Expect, Moment, Pace, ROWS};
+use super::scene::{Found, RING, STEADY_AT, Scene, Strike, T, measured_bound, run};
 use rand::{RngExt, SeedableRng};
 use rand_chacha::ChaCha8Rng;
 use serde::Serialize;

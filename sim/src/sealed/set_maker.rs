@@ -1,4 +1,4 @@
-//! The bench of one sealed set: its fingertip, its noise, its causes' sizes, its measurement.
+//! The maker of one sealed set: its fingertip, its noise, its causes' sizes, its measurement.
 
 use super::design::Planned;
 use super::oracle::Case;
@@ -27,7 +27,7 @@ pub struct SetNoise {
 }
 
 /// What a set is measured on.
-pub(super) struct Bench {
+pub(super) struct SetMaker {
     pub(super) finger: Finger,
     pub(super) nominal: Finger,
     pub(super) scatter: SetNoise,
@@ -54,7 +54,7 @@ pub(super) const GAP: [f64; 2] = [0.12, 20.0];
 /// Halvings of a size's range.
 const HALVINGS: usize = 8;
 
-impl Bench {
+impl SetMaker {
     pub(super) fn draw(noise: &mut Noise, seed: u64) -> Self {
         let normal = noise.log_between(0.8e6, 4e6);
         let poisson_ratio = noise.between(0.3, 0.49);
