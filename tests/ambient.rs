@@ -4,10 +4,10 @@
 use models::prediction::SpringSlider;
 use realtime::cycle::Phase;
 use realtime::turn::Row;
-use runs::ambient::{Answers, Bench, Level, Source, World};
+use runs::ambient::{Answers, Level, RigSide, Source, World};
+use runs::job::{Job, Signals, Update};
 use runs::plan::{Plan, Resolution};
 use runs::sequence::{Event, MeasuredPass, Outcome, Sequence};
-use runs::session::{Job, Signals, Update};
 use runs::setup::Setup;
 use runs::supervisor::{self, Requests, VirtualLoop};
 use std::path::{Path, PathBuf};
@@ -312,7 +312,7 @@ fn every_step_of_a_person_finds_the_rig_disarmed() {
             .at_rig(&plan, &setup);
     let world = sim::virtual_rig::VirtualRig::new(&sim::world::WorldConfig::ideal(), 1).unwrap().split();
     let air = World::Virtual(world[0].clone());
-    let mut bench = Bench::open(&sequence, None, Some(air), Answers::Simulated).unwrap();
+    let mut rig_side = RigSide::open(&sequence, None, Some(air), Answers::Simulated).unwrap();
     let [force, amplifier, stage] = world;
     let ports = realtime::turn::Ports::new(Box::new(force), Box::new(amplifier), Box::new(stage.clone()));
     let ports = realtime::turn::Ports { supply: Box::new(stage), ..ports };
@@ -327,7 +327,7 @@ fn every_step_of_a_person_finds_the_rig_disarmed() {
                 at_rest(row);
             }
             asked = (asked || begins) && !ends;
-            bench.serve(row.now, sequence, &reaction);
+            rig_side.serve(row.now, sequence, &reaction);
             passes.extend(reaction.pass);
             events.extend(reaction.events);
         });
@@ -413,7 +413,7 @@ fn operator_sample_and_protocol_survive_a_resume_and_go_into_every_form() {
         "[protocol]\nfinger_washing = \"commercial soap\"\nequilibration_min = 3\nmoisture_au = \"\"\n";
     let text = format!("{PLAN}{protocol}");
     let setup = Setup::load("virtual-ideal").unwrap();
-    let session = |notes: runs::session::Notes, stop_after: Option<usize>| {
+    let session = |notes: runs::job::Notes, stop_after: Option<usize>| {
         let signals = Signals::default();
         let stops = Arc::clone(&signals.stops);
         let job = Job { notes, ..job(setup.clone(), &text, &out) };
@@ -428,7 +428,7 @@ fn operator_sample_and_protocol_survive_a_resume_and_go_into_every_form() {
     };
     let (operator, sample) = (Some("Ada".to_string()), Some("silicone tip 3".to_string()));
     let first = session(
-        runs::session::Notes { operator, sample, licence: Some("CC-BY-4.0".into()), ..Default::default() },
+        runs::job::Notes { operator, sample, licence: Some("CC-BY-4.0".into()), ..Default::default() },
         Some(3),
     );
     assert_eq!(first.outcome, Outcome::Stopped);

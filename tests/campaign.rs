@@ -3,7 +3,7 @@
 use models::prediction::SpringSlider;
 use rayon::prelude::*;
 use runs::campaign::{self, Campaign};
-use runs::session::{Job, Signals};
+use runs::job::{Job, Signals};
 use std::collections::BTreeMap;
 use std::path::Path;
 use std::sync::Arc;
@@ -25,7 +25,7 @@ fn ideal(seed: u64, blocks: u32) -> Campaign {
 /// Its answers on a virtual rig with these defects.
 fn answers(campaign: &Campaign, defects: &str) -> Vec<Claim> {
     let folder = tempfile::tempdir().unwrap();
-    let job = |session: campaign::Session| {
+    let job = |session: campaign::CampaignRun| {
         let setup = campaign.setups[session.cell].clone();
         Job {
             model: Arc::new(SpringSlider::new(setup.tip.finger).unwrap()),

@@ -4,11 +4,11 @@
 use diagnosis::timing::{Comparison, judge, mean_delay_s};
 use models::prediction::SpringSlider;
 use rayon::prelude::*;
+use runs::edges::Collector;
+use runs::job::sweep_in_memory;
 use runs::plan::Plan;
 use runs::sequence::Outcome;
-use runs::session::rehearse;
 use runs::setup::Setup;
-use runs::verdict::edges::Collector;
 use sim::defects::Defects;
 use sim::world::WorldConfig;
 use std::sync::Arc;
@@ -40,7 +40,7 @@ fn run(seed: u64, world: &WorldConfig) -> [Comparison; 2] {
     let model = Arc::new(SpringSlider::new(setup.tip.finger).unwrap());
     let mut found = Collector::default();
     let plan = Plan::parse("edges", PLAN).unwrap();
-    let done = rehearse(&setup, &plan, seed, world, model.clone(), &mut |row| found.row(row)).unwrap();
+    let done = sweep_in_memory(&setup, &plan, seed, world, model.clone(), &mut |row| found.row(row)).unwrap();
     assert_eq!(done.outcome, Outcome::Complete, "{world:?}");
     let part = judge(&found.edges, &*model, setup.lateral_passband_hz());
     part.comparisons.try_into().unwrap()

@@ -3,9 +3,9 @@
 
 use models::prediction::SpringSlider;
 use realtime::safety::Cause;
+use runs::job::{Job, Signals, Update};
 use runs::plan::Plan;
 use runs::sequence::{Event, Outcome};
-use runs::session::{Job, Signals, Update};
 use runs::setup::Setup;
 use std::path::Path;
 use std::sync::Arc;
@@ -62,7 +62,7 @@ fn run(tables: &str, limits: &str, hand: bool) -> (Outcome, usize, usize, Vec<Ev
             events.push(event.clone());
         }
     };
-    let summary = rig::session::run(job, &Signals::default(), &mut update).unwrap();
+    let summary = rig::wall_run::run(job, &Signals::default(), &mut update).unwrap();
     (summary.outcome, summary.passes, summary.planned, events)
 }
 

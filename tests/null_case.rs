@@ -4,9 +4,9 @@
 use models::prediction::{FrictionModel, SpringSlider};
 use rayon::prelude::*;
 use realtime::compare::{Agreement, Lack};
+use runs::job::{MemorySweep, sweep_in_memory};
 use runs::plan::Plan;
 use runs::sequence::Outcome;
-use runs::session::{Rehearsal, rehearse};
 use runs::setup::Setup;
 use sim::defects::Defects;
 use sim::world::WorldConfig;
@@ -50,21 +50,21 @@ fn rig() -> (Setup, Plan, Arc<dyn FrictionModel>) {
     (setup, plan, model)
 }
 
-fn departed(run: &Rehearsal) -> bool {
+fn departed(run: &MemorySweep) -> bool {
     run.agreement == Agreement::Departed
 }
 
-fn agrees(run: &Rehearsal) -> bool {
+fn agrees(run: &MemorySweep) -> bool {
     matches!(run.agreement, Agreement::Agrees { .. })
 }
 
-fn run_all(world: &WorldConfig, runs: u64) -> Vec<Rehearsal> {
+fn run_all(world: &WorldConfig, runs: u64) -> Vec<MemorySweep> {
     let (setup, plan, model) = rig();
     (0..runs)
         .into_par_iter()
         .map(|i| {
-            let done =
-                rehearse(&setup, &plan, FIRST_SEED + i, world, Arc::clone(&model), &mut |_| {}).unwrap();
+            let done = sweep_in_memory(&setup, &plan, FIRST_SEED + i, world, Arc::clone(&model), &mut |_| {})
+                .unwrap();
             assert_eq!(done.outcome, Outcome::Complete);
             done
         })

@@ -3,9 +3,9 @@
 
 use models::prediction::SpringSlider;
 use rayon::prelude::*;
+use runs::job::{Job, Signals};
 use runs::plan::Plan;
 use runs::sequence::Outcome;
-use runs::session::{Job, Signals};
 use runs::setup::Setup;
 use sim::defects::{self, Defects};
 use std::collections::BTreeMap;

@@ -17,7 +17,7 @@ fn the_examples_hold_and_the_page_shows_what_they_say() {
     let page = std::fs::read_to_string(file("docs/profiles.md")).unwrap();
     let texts: Vec<String> = EXAMPLES.iter().map(|name| source(name).text).collect();
     for name in EXAMPLES {
-        runs::rehearsal::of(&file(&format!("docs/profiles/{name}.toml")))
+        runs::profile_trial::of(&file(&format!("docs/profiles/{name}.toml")))
             .unwrap_or_else(|said| panic!("{said}"));
         assert!(page.contains(&format!("(profiles/{name}.toml)")), "the page does not link {name}");
     }

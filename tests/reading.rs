@@ -16,9 +16,9 @@ use models::surrogate::Surrogate;
 use rand_chacha::ChaCha8Rng;
 use rand_chacha::rand_core::{Rng, SeedableRng};
 use rayon::prelude::*;
+use runs::job::sweep_in_memory;
 use runs::plan::{Plan, Resolution};
 use runs::sequence::Outcome;
-use runs::session::rehearse;
 use runs::setup::Setup;
 use sim::world::WorldConfig;
 use std::sync::Arc;
@@ -119,8 +119,9 @@ fn on_the_virtual_rig(strokes: f64) -> Vec<ReadingFinding> {
     (0..sweeps())
         .into_par_iter()
         .map(|i| {
-            let run = rehearse(&setup, &plan, FIRST_SEED + i, &world, Arc::clone(&model) as _, &mut |_| {})
-                .unwrap();
+            let run =
+                sweep_in_memory(&setup, &plan, FIRST_SEED + i, &world, Arc::clone(&model) as _, &mut |_| {})
+                    .unwrap();
             assert_eq!(run.outcome, Outcome::Complete);
             let passes =
                 run.passes.iter().filter_map(|p| Some((p.pass.condition(1.0), p.pass.friction_force_n()?)));

@@ -1,8 +1,8 @@
 //! The record under abuse: cut at every byte, bits flipped.
 
 use realtime::recorder::{self, Integrity, Recovery};
+use runs::job::{Job, Signals};
 use runs::plan::Plan;
-use runs::session::{Job, Signals};
 use runs::setup::Setup;
 use std::io::Cursor;
 use std::sync::{Arc, LazyLock};
@@ -29,7 +29,7 @@ static RECORD: LazyLock<Vec<u8>> = LazyLock::new(|| {
         notes: Default::default(),
         answers: None,
     };
-    rig::session::run(job, &Signals::default(), &mut |_| {}).unwrap();
+    rig::wall_run::run(job, &Signals::default(), &mut |_| {}).unwrap();
     std::fs::read(out.join("run-1.mcap")).unwrap()
 });
 

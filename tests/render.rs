@@ -4,8 +4,8 @@
 use realtime::recorder::{CYCLES, Entry, Reader};
 use realtime::turn::Row;
 use runs::fidelity::{Fidelity, Group, dynamics::Dynamics, of_run, read};
+use runs::job::{Job, Replayable, Signals, TARGET};
 use runs::plan::Plan;
-use runs::session::{Job, Replayable, Signals, TARGET};
 use runs::setup::Setup;
 use std::path::Path;
 use std::sync::Arc;

@@ -260,14 +260,14 @@ fn everything_bundled_passes_its_own_check() {
 #[test]
 fn deadlines_that_were_missed_are_counted_with_their_lateness() {
     use realtime::ports::Nanos;
-    use runs::session::{LATENESS_BOUNDS_S, Snapshots, rehearse};
+    use runs::job::{LATENESS_BOUNDS_S, Snapshots, sweep_in_memory};
     let setup = runs::setup::Setup::load("virtual-ideal").unwrap();
     let folder = tempfile::tempdir().unwrap();
     let plan = runs::plan::Plan::load(&short_plan(folder.path())).unwrap();
     let model = std::sync::Arc::new(models::prediction::SpringSlider::new(setup.tip.finger).unwrap());
     let mut first = None;
     let world = sim::world::WorldConfig::ideal();
-    rehearse(&setup, &plan, 3, &world, model, &mut |row| first = first.or(Some(*row))).unwrap();
+    sweep_in_memory(&setup, &plan, 3, &world, model, &mut |row| first = first.or(Some(*row))).unwrap();
     let mut snapshots = Snapshots::of(5, Nanos(1_000_000));
     let mut late = |ns, at| {
         let mut row = first.unwrap();

@@ -5,9 +5,9 @@ use models::pass::Pass;
 use models::prediction::SpringSlider;
 use models::quantity::PeakToPeak;
 use rayon::prelude::*;
+use runs::job::sweep_in_memory;
 use runs::plan::Plan;
 use runs::sequence::Outcome;
-use runs::session::rehearse;
 use runs::setup::Setup;
 use sim::finger::Finger;
 use sim::world::WorldConfig;
@@ -26,7 +26,8 @@ fn swept(sweeps: u64, world: &WorldConfig) -> Vec<(Vec<Pass>, f64)> {
         .into_par_iter()
         .map(|i| {
             let seed = FIRST_SEED + i;
-            let run = rehearse(&setup, &plan, seed, world, Arc::clone(&model) as _, &mut |_| {}).unwrap();
+            let run =
+                sweep_in_memory(&setup, &plan, seed, world, Arc::clone(&model) as _, &mut |_| {}).unwrap();
             assert_eq!(run.outcome, Outcome::Complete);
             let finger = Finger::new(&world.finger, seed);
             let truth = finger.lateral_stiffness_n_per_m / finger.normal_stiffness_n_per_m;

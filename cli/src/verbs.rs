@@ -66,9 +66,9 @@ pub const INTERNAL: u8 = 3;
 
 /// The status of an error: refused, unless a run had begun.
 pub fn status_of(error: &miette::Report) -> u8 {
-    use ::runs::session::Unfinished;
+    use ::runs::job::Unfinished;
     match error.downcast_ref::<Unfinished>() {
-        Some(Unfinished::NotKept | Unfinished::Interrupted | Unfinished::NotOff) => FAILED,
+        Some(Unfinished::NotSaved | Unfinished::Interrupted | Unfinished::NotOff) => FAILED,
         Some(Unfinished::Internal) => INTERNAL,
         None => REFUSED,
     }
@@ -113,7 +113,7 @@ pub fn defects(path: &Path) -> miette::Result<sim::defects::Defects> {
 }
 
 /// Refuses what a person named and that is not there, and says what is beside it.
-pub fn there(path: &Path, what: &str) -> miette::Result<()> {
+pub fn must_exist(path: &Path, what: &str) -> miette::Result<()> {
     const RUN: [&str; 5] = ["points.csv", ::runs::run_dir::JOURNAL, "run.toml", "run-1.mcap", "sessions"];
     if path.is_dir() && what.starts_with("run") && !RUN.iter().any(|name| path.join(name).exists())
         || what == "run" && path.is_file()
@@ -184,7 +184,7 @@ pub fn exit(status: u8) -> miette::Result<ExitCode> {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use ::runs::session::Unfinished;
+    use ::runs::job::Unfinished;
 
     #[test]
     fn numbers_of_the_system_are_left_out() {
@@ -200,10 +200,10 @@ mod tests {
 
     #[test]
     fn a_file_is_no_run() {
-        let why = there(Path::new("Cargo.toml"), "run").unwrap_err();
+        let why = must_exist(Path::new("Cargo.toml"), "run").unwrap_err();
         assert_eq!(why.to_string(), "there is no run at 'Cargo.toml'");
         assert!(why.help().unwrap().to_string().contains("a run is a folder"));
-        assert!(there(Path::new("Cargo.toml"), "run or table").is_ok());
+        assert!(must_exist(Path::new("Cargo.toml"), "run or table").is_ok());
     }
 
     #[test]
@@ -234,10 +234,10 @@ mod tests {
     fn refused_means_that_nothing_was_touched() {
         let full = || miette::miette!("No space left on device");
         assert_eq!(status_of(&full()), REFUSED);
-        assert_eq!(status_of(&full().wrap_err(Unfinished::NotKept)), FAILED);
+        assert_eq!(status_of(&full().wrap_err(Unfinished::NotSaved)), FAILED);
         assert_eq!(status_of(&full().wrap_err(Unfinished::Internal)), INTERNAL);
         assert_eq!(status_of(&full().wrap_err(Unfinished::NotOff)), FAILED);
         assert_eq!(status_of(&Unfinished::Interrupted.into()), FAILED);
-        assert_eq!(status_of(&full().wrap_err(Unfinished::NotKept).wrap_err("and more")), FAILED);
+        assert_eq!(status_of(&full().wrap_err(Unfinished::NotSaved).wrap_err("and more")), FAILED);
     }
 }

@@ -1,4 +1,5 @@
-//! From probabilities to a verdict and its alias class. docs/diagnosis/model.md, section 9.
+//! From probabilities to a [`Verdict`] and its alias class; the report of it is in `verdict.rs`.
+//! docs/diagnosis/model.md, section 9.
 //!
 //! [`decide`] takes the steps in the order of that page:
 //!

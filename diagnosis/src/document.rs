@@ -2,7 +2,7 @@
 
 use crate::certificates::{AtFault, InDoubt, at_fault, in_doubt};
 use crate::data::{self, Table};
-use crate::describe::three_digits;
+use crate::format::three_digits;
 use crate::unstated::Unstated;
 use crate::verdict::{Diagnosis, Report};
 use models::covariate::{COVARIATES, Covariate, Role};

@@ -4,7 +4,7 @@ use crate::bases::beside_each_other;
 use crate::constants::Constants;
 use crate::data::RigFile;
 use crate::gaussian::{Covariance, HALF_LN_2PI};
-use crate::law::Law;
+use crate::law::BaseLaw;
 use crate::layout::{Layout, NUISANCES};
 pub use crate::member::Member;
 use effects::{Active, Baseline, Contact, Design, Input, library};
@@ -46,7 +46,7 @@ pub struct Problem {
     /// Tunable constants of the diagnosis.
     pub constants: Arc<Constants>,
     /// The base law; none: the spring-slider.
-    pub law: Option<Arc<Law>>,
+    pub law: Option<Arc<BaseLaw>>,
     /// Effects of the user's own that are tried; beyond their tables there is no prediction.
     pub own: Vec<usize>,
     /// Of each pass: force of the base law beside the nominal spring-slider's, and the law's uncertainty, N.
@@ -109,13 +109,13 @@ impl Problem {
 
     /// The same problem on a base law, which is read once for each pass.
     #[must_use]
-    pub fn on(self, law: Option<&Arc<Law>>) -> Self {
+    pub fn on(self, law: Option<&Arc<BaseLaw>>) -> Self {
         let beside =
             law.map_or_else(Vec::new, |law| self.passes.iter().map(|p| self.beside(law, p)).collect());
         Problem { law: law.cloned(), beside, ..self }
     }
 
-    fn beside(&self, law: &Law, pass: &Condition) -> [f64; 2] {
+    fn beside(&self, law: &BaseLaw, pass: &Condition) -> [f64; 2] {
         law.beside(&self.nominal, &self.design, pass)
     }
 

@@ -20,7 +20,7 @@ use crate::evidence::{Posterior, averaged_over_form};
 use crate::fit::Problem;
 pub use crate::fitted::{Candidate, Fitted};
 use crate::gaussian::log_sum_exp;
-use crate::law::Law;
+use crate::law::BaseLaw;
 use crate::layout::{Layout, NUISANCES};
 use crate::least_squares::minimise;
 use crate::noise::settle;
@@ -50,7 +50,7 @@ pub struct Options {
     /// Receives the progress of the diagnosis.
     pub progress: Progress,
     /// The base law; none: the spring-slider.
-    pub law: Option<Arc<Law>>,
+    pub law: Option<Arc<BaseLaw>>,
 }
 
 impl Default for Options {

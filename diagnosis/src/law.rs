@@ -42,19 +42,19 @@ pub struct CannotTell {
 }
 
 /// A base law on a table.
-pub struct Law {
+pub struct BaseLaw {
     model: Arc<dyn FrictionModel>,
     text: Option<String>,
     left_out: Vec<u64>,
 }
 
-impl std::fmt::Debug for Law {
+impl std::fmt::Debug for BaseLaw {
     fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
-        f.debug_struct("Law").field("note", &self.note()).finish_non_exhaustive()
+        f.debug_struct("BaseLaw").field("note", &self.note()).finish_non_exhaustive()
     }
 }
 
-impl Law {
+impl BaseLaw {
     /// A law with the text of its file (none for a built-in one), and the passes of a table at which it can
     /// tell.
     ///
@@ -64,7 +64,7 @@ impl Law {
         model: Arc<dyn FrictionModel>,
         text: Option<String>,
         table: &Table,
-    ) -> Result<(Law, Table), CannotTell> {
+    ) -> Result<(BaseLaw, Table), CannotTell> {
         let mu0 = table.nominal_mu0();
         let tells = |i: &usize| model.predict(&Condition { mu0, ..table.passes[*i] });
         let (within, without): (Vec<usize>, Vec<usize>) = (0..table.len()).partition(|i| tells(i).is_ok());
@@ -77,7 +77,7 @@ impl Law {
                 point: table.points[*first],
                 why: tells(first).map_or_else(|why| why.to_string(), |_| String::new()),
             }),
-            _ => Ok((Law { model, text, left_out }, table.select(&within))),
+            _ => Ok((BaseLaw { model, text, left_out }, table.select(&within))),
         }
     }
 

@@ -24,8 +24,10 @@
 //! | [`reading`] | which reading of the paper's w the passes favour |
 //! | [`unstated`] | what conditions must state before the verdict's model predicts them |
 //! | [`describe`] | what an unknown departure looks like; causes that are sure all the same |
+//! | [`mod@format`] | names and numbers in the sentences of a verdict |
 //! | [`timing`] | what the edges in a run's record say of lags and shifts in time |
 //! | [`verdict`], [`document`], [`remarks`], [`certificates`], [`saved`] | report, JSON, remarks, model |
+//! | [`with_suspects`] | the verdict if suspect passes counted as any other |
 //!
 //! docs/diagnosis/model.md states the whole model once, with the module of each section. An example:
 //!
@@ -60,6 +62,7 @@ mod draws;
 pub mod evidence;
 pub mod fit;
 pub mod fitted;
+pub mod format;
 pub mod gaussian;
 pub mod hypotheses;
 pub mod intervals;
@@ -93,5 +96,6 @@ mod tests;
 pub mod timing;
 pub mod unstated;
 pub mod verdict;
+pub mod with_suspects;
 
 pub use decision::Verdict;

@@ -1,57 +1,18 @@
 //! Remarks beside a verdict, in words: what is missing from the table, what was assumed, what its scatter says.
 
 use crate::bases::Bends;
-use crate::data::{RigFile, Table};
-use crate::decision::{Decision, Verdict, decide};
-use crate::describe::probability;
-use crate::hypotheses::{Candidate, Fitted, Options, fit_believing};
+use crate::data::Table;
+use crate::decision::{Decision, Verdict};
+use crate::format::probability;
+use crate::hypotheses::{Candidate, Fitted};
 use crate::kernel::scaled;
-use crate::scatter::{Belief, Scatter};
+use crate::scatter::Scatter;
+use crate::with_suspects::{WithSuspects, leading};
 use models::covariate::{AMPLITUDE, Role, SMOOTH};
 use models::quantity::PeakToPeak;
-use serde::Serialize;
 
 /// Most suspect passes that the text lists, the farthest first.
 const LISTED: usize = 8;
-
-/// The verdict on a table whose suspect passes count as any other.
-#[derive(Debug, Clone, PartialEq, Serialize, schemars::JsonSchema)]
-pub struct WithSuspects {
-    /// The answer.
-    pub verdict: Verdict,
-    /// The leading effects; none for no gap, `unknown` for the open set.
-    pub effects: Vec<String>,
-    /// Their probability.
-    pub probability: f64,
-}
-
-/// The leading effects of a decision and their probability.
-fn leading(fitted: &Fitted, decision: &Decision) -> (Vec<String>, f64) {
-    match (decision.verdict, decision.leader()) {
-        (Verdict::NoGap, _) => (Vec::new(), decision.none),
-        (Verdict::Named | Verdict::Ambiguous, Some(leader)) => {
-            let names = fitted.candidates[leader].names().iter().map(|n| (*n).to_string()).collect();
-            (names, decision.probabilities[leader])
-        }
-        _ => (vec!["unknown".to_string()], decision.unknown),
-    }
-}
-
-/// The verdict if suspect passes counted as any other; none where no pass is suspect.
-pub fn with_suspects(
-    fitted: &Fitted,
-    table: &Table,
-    rig: &RigFile,
-    options: &Options,
-) -> Option<WithSuspects> {
-    if fitted.scatter.suspects.is_empty() {
-        return None;
-    }
-    let mut fitted = fit_believing(table, rig, options, &Belief::All);
-    let decision = decide(&mut fitted);
-    let (effects, probability) = leading(&fitted, &decision);
-    Some(WithSuspects { verdict: decision.verdict, effects, probability })
-}
 
 /// Relative departure of the scatter from the statement below which the statement was used.
 const AS_STATED: f64 = 0.01;
@@ -282,21 +243,10 @@ fn suspects(scatter: &Scatter, effects: &[String], verdict: Verdict, other: &Wit
     )
 }
 
-impl WithSuspects {
-    fn words(&self) -> String {
-        let name = match self.verdict {
-            Verdict::NoGap => return "no gap".to_string(),
-            Verdict::Unknown => return "unknown".to_string(),
-            Verdict::Named => "named",
-            Verdict::Ambiguous => "ambiguous",
-        };
-        format!("{name} {}", self.effects.join("+"))
-    }
-}
-
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::hypotheses::Options;
     use crate::tests::{Deviates, rig, table};
     use crate::verdict::diagnose;
 

@@ -13,7 +13,7 @@ use serde::Serialize;
 const BLOCK: usize = 6;
 const MOST_BLOCKS: usize = 40;
 /// Fewest passes that a fold may leave to the fit.
-const LEAST_KEPT: usize = 10;
+const LEAST_FITTED: usize = 10;
 /// Fewest resamples with a gap for an interval.
 const LEAST_DRAWS: usize = 20;
 /// Squared errors of a pass: under four models, of repeatability, and the part of it that passes have in common.
@@ -111,7 +111,7 @@ pub fn gap(fitted: &Fitted, table: &Table, rig: &RigFile, answer: &Answer) -> Ga
         .map(|fold| {
             let (out, rest): (Vec<usize>, Vec<usize>) =
                 (0..table.len()).partition(|&i| groups[i] % folds == fold);
-            if out.is_empty() || rest.len() < LEAST_KEPT {
+            if out.is_empty() || rest.len() < LEAST_FITTED {
                 return Vec::new();
             }
             let fit = model(fitted, table, answer, Some(&rest));

@@ -1,8 +1,10 @@
-//! The verdict: everything the diagnosis says about one table, in the shape of docs/contract.md.
+//! The report of a verdict: everything the diagnosis says about one table, in the shape of docs/contract.md.
+//! The answer itself, [`Verdict`], is in `decision.rs`, with the rule that gives it.
 
 use crate::data::{RigFile, Table};
 use crate::decision::{Decision, Verdict, decide};
-use crate::describe::{Description, at_least, description, not_named, plain, probability};
+use crate::describe::{Description, at_least, description, not_named};
+use crate::format::{plain, probability};
 use crate::hypotheses::{Fitted, Options, fit_all};
 use crate::intervals::{Estimate, curvature, estimates};
 use crate::law::LawNote;
@@ -13,12 +15,13 @@ use crate::novelty::widened;
 use crate::power::{SeenFrom, seen_from};
 use crate::predict::{Answer, Forecast, forecast, model};
 use crate::pulls::{Pull, pulls};
-use crate::remarks::{WithSuspects, of_scatter, of_table, with_suspects};
+use crate::remarks::{of_scatter, of_table};
 use crate::run_shifts::shifted;
 use crate::scatter::Scatter;
 use crate::shrinkage::{Gap, gap};
 use crate::timing::{Comparison, RecordPart};
 use crate::unstated::{Unstated, unstated};
+use crate::with_suspects::{WithSuspects, with_suspects};
 use effects::{Effect, Need, imitated};
 use models::condition::Condition;
 use models::reading_evidence::ReadingFinding;

@@ -8,19 +8,19 @@
 //! | `calibrate` | certificates from files; the skin of a finger from a phase table |
 //! | `plans` | plans: read, made, judged on a setup |
 //! | `tabulate` | a user's own law as a table |
-//! | `verdict` | the diagnosis of a table |
+//! | `diagnose` | the diagnosis of a table |
 //! | `runs` | a run's folder; a sweep on the virtual rig in virtual time |
 
 // Messages of refusals go to Python as they are; nothing is printed from here.
 #![deny(clippy::print_stdout, clippy::print_stderr)]
 
 mod calibrate;
+mod diagnose;
 mod laws;
 mod plans;
 mod ridge;
 mod runs;
 mod tabulate;
-mod verdict;
 
 use pyo3::prelude::*;
 
@@ -58,7 +58,7 @@ fn _muprime(m: &Bound<'_, PyModule>) -> PyResult<()> {
     m.add_function(wrap_pyfunction!(tabulate::law_grid, m)?)?;
     m.add_function(wrap_pyfunction!(tabulate::law_conditions, m)?)?;
     m.add_function(wrap_pyfunction!(tabulate::law_table, m)?)?;
-    m.add_function(wrap_pyfunction!(verdict::diagnose, m)?)?;
+    m.add_function(wrap_pyfunction!(diagnose::diagnose, m)?)?;
     m.add_function(wrap_pyfunction!(calibrate::calibrate, m)?)?;
     m.add_function(wrap_pyfunction!(calibrate::certificate, m)?)?;
     m.add_function(wrap_pyfunction!(calibrate::fit_finger, m)?)?;

@@ -11,8 +11,8 @@ use realtime::cycle::{self, Command, CycleState, Inputs, Marker, Phase};
 use realtime::estimate::Mu0;
 use realtime::ports::{AmplifierState, Contacts, Forces, Nanos, NoData, Quality, Sample, StageState};
 use realtime::safety::{Observation, Request};
+use runs::job::sweep_in_memory;
 use runs::plan::Plan;
-use runs::session::rehearse;
 use runs::setup::Setup;
 use sim::wire::SharedPlant;
 use sim::wire::modbus_tcp::ModbusTcpServer;
@@ -113,7 +113,8 @@ fn sweep_in_virtual_time(bencher: Bencher<'_, '_>) {
     let plan = Plan::load("first-sweep").unwrap();
     let model: Arc<dyn FrictionModel> = Arc::new(SpringSlider::new(setup.tip.finger).unwrap());
     let run = |seed| {
-        rehearse(&setup, &plan, seed, &WorldConfig::bundled(), Arc::clone(&model), &mut |_| {}).unwrap()
+        sweep_in_memory(&setup, &plan, seed, &WorldConfig::bundled(), Arc::clone(&model), &mut |_| {})
+            .unwrap()
     };
     let cycles = run(1).cycles;
     bencher.counter(ItemsCount::new(cycles)).bench_local(|| run(1));

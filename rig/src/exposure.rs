@@ -16,7 +16,7 @@ use miette::WrapErr;
 use realtime::pacing::Lifeline;
 use realtime::ports::Nanos;
 use realtime::safety::{Exposed, Limits, MINUTE_NS, MINUTES, PART_MINUTES, PARTS};
-use runs::session::Notes;
+use runs::job::Notes;
 use runs::setup::Setup;
 use serde::{Deserialize, Serialize};
 use std::collections::BTreeMap;

@@ -2,7 +2,7 @@
 //!
 //! | module | purpose |
 //! |---|---|
-//! | [`session`] | a sweep over instruments from beginning to end |
+//! | [`wall_run`] | a sweep over instruments from beginning to end |
 //! | [`wall_loop`] | the loop in wall-clock time: a thread of its own, instruments behind links |
 //! | [`emulators`] | a virtual rig's instruments where the setup looks for them |
 //! | [`rig_lock`], [`exposure`] | one controller a rig; a finger's exposure, carried from run to run |
@@ -26,7 +26,7 @@ pub mod free_ports;
 pub mod live;
 pub mod publish;
 pub mod rig_lock;
-pub mod session;
 pub mod terminal;
 pub mod wall_loop;
+pub mod wall_run;
 pub mod watch;

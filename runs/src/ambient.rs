@@ -4,9 +4,9 @@
 //! the operator, or the world of a virtual rig. What a pass holds is what was found, with its source and its
 //! age, never what was planned.
 
-mod bench;
+mod rig_side;
 
-pub use bench::{Answers, Bench, World};
+pub use rig_side::{Answers, RigSide, World};
 
 use crate::input::{Problems, unit_meant, unit_of};
 use crate::plan::{Plan, series_place};

@@ -91,9 +91,9 @@ pub struct Campaign {
     pub folder: PathBuf,
 }
 
-/// One session: a cell in a block.
+/// The run of one session: a cell in a block.
 #[derive(Clone, Debug, PartialEq, Eq)]
-pub struct Session {
+pub struct CampaignRun {
     /// Number in the order of measurement, from 1.
     pub number: usize,
     /// Block, from 1.
@@ -246,7 +246,7 @@ fn edited(
 }
 
 /// All sessions of a campaign in the order of measurement: in each block every cell, in an order of its own.
-pub fn sessions(file: &CampaignFile) -> Vec<Session> {
+pub fn sessions(file: &CampaignFile) -> Vec<CampaignRun> {
     let mut random = ChaCha12Rng::seed_from_u64(file.seed);
     let mut all = Vec::new();
     for block in 1..=file.blocks {
@@ -257,7 +257,7 @@ pub fn sessions(file: &CampaignFile) -> Vec<Session> {
             let folder = Path::new("sessions").join(format!("{number:02}-{}", file.cell[cell].name));
             // Sessions apart by far more than replicates are.
             let seed = file.seed.wrapping_mul(1_000_003).wrapping_add(number as u64) & i64::MAX as u64;
-            all.push(Session { number, block, cell, seed, folder });
+            all.push(CampaignRun { number, block, cell, seed, folder });
         }
     }
     all
@@ -265,6 +265,6 @@ pub fn sessions(file: &CampaignFile) -> Vec<Session> {
 
 /// Whether the run in a folder was completed.
 pub fn is_complete(run: &Path) -> bool {
-    crate::session::Summary::written_in(run)
+    crate::job::Summary::written_in(run)
         .is_some_and(|summary| summary.outcome == crate::sequence::Outcome::Complete)
 }

@@ -9,7 +9,7 @@ pub use annotations::{ANNOTATIONS, Annotations, LONGEST_NOTE, LONGEST_TAG, MOST_
 pub use lineage::{Lineage, lineage};
 
 use crate::run_dir::{self, header_facts, passes_in, sessions_in};
-use crate::verdict::files::DOCUMENT;
+use crate::verdict_text::files::DOCUMENT;
 use miette::{IntoDiagnostic, WrapErr};
 use serde::{Deserialize, Serialize};
 use std::path::{Path, PathBuf};

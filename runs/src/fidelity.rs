@@ -6,9 +6,9 @@ pub mod dynamics;
 mod lateness;
 mod spectra;
 
+use crate::job::TARGET;
 use crate::plan::{Point, RenderPlan};
 use crate::run_dir::{open_record, records_in};
-use crate::session::TARGET;
 use dynamics::{Dynamics, Part};
 pub use lateness::Late;
 use miette::IntoDiagnostic;
@@ -343,8 +343,8 @@ pub fn of_run(folder: &Path) -> miette::Result<Option<Fidelity>> {
                 Entry::File { name, bytes, .. } if name == STATED => {
                     stated = serde_json::from_slice(&bytes).unwrap_or_default();
                 }
-                Entry::File { name, bytes, .. } if name == crate::session::REPLAYABLE => {
-                    let built = serde_json::from_slice::<crate::session::Replayable>(&bytes).ok();
+                Entry::File { name, bytes, .. } if name == crate::job::REPLAYABLE => {
+                    let built = serde_json::from_slice::<crate::job::Replayable>(&bytes).ok();
                     cycle_s = built.map_or(cycle_s, |built| built.config.limits.timing.cycle.seconds());
                 }
                 // The files come first.

@@ -2,7 +2,7 @@
 //!
 //! No instrument and no loop in wall-clock time is here: the crate `rig` runs the same sweep over
 //! instruments. Downstream: `input` -> `setup`, `plan` -> `certificates` -> `sequence`, `supervisor` ->
-//! `session` -> `run_dir` -> `run_data` -> `report`.
+//! `job` -> `run_dir` -> `run_data` -> `report`.
 //!
 //! | module | purpose |
 //! |---|---|
@@ -13,14 +13,15 @@
 //! | [`bundled`] | those that come with the program, by name |
 //! | [`campaign`] | one plan with several tips, conditions and days: its sessions in their order |
 //! | [`certificates`], [`model_file`] | a setup's certificates, verified and applied once; a corrected model from its file to the loop |
-//! | [`rehearsal`] | a profile tried before any instrument is |
-//! | [`sequence`] | the order of a sweep: a pure state machine over the loop's rows |
+//! | [`profile_trial`] | a profile tried before any instrument is |
+//! | [`sequence`] | the steps of a sweep through its passes: a pure state machine over the loop's rows |
 //! | [`supervisor`] | the one way to lead a loop: stop first, switch off, read back; and the loop in virtual time |
-//! | [`session`] | a sweep from its job to its summary, in virtual time |
+//! | [`job`] | a sweep from its job to its summary, in virtual time |
 //! | [`ambient`], [`exposure_left`] | levels of the air, set and read; what is left of a finger's exposure |
 //! | [`run_dir`], [`run_data`], [`catalogue`] | a run's folder; the run as read from there; the list of runs |
 //! | [`report`], [`compare`], [`fidelity`] | pages; runs side by side; how faithfully a target was rendered |
-//! | [`verdict`] | a verdict for people at a terminal, and the plan of the next experiment |
+//! | [`edges`] | the steps and turns in a run's record, for what a verdict says of time |
+//! | [`verdict_text`] | a verdict as text for people at a terminal, and the plan of the next experiment |
 //!
 //! ```
 //! use muprime_runs::plan::Plan;
@@ -42,24 +43,25 @@ pub mod campaign;
 pub mod catalogue;
 pub mod certificates;
 pub mod compare;
+pub mod edges;
 pub mod exposure_left;
 pub mod fidelity;
 pub mod files;
 pub mod fingertip;
 pub mod human;
 pub mod input;
+pub mod job;
 pub mod leave;
 pub mod model_file;
 pub mod plan;
 pub mod print;
+pub mod profile_trial;
 pub mod quantity;
-pub mod rehearsal;
 pub mod report;
 pub mod run_data;
 pub mod run_dir;
 pub mod sequence;
-pub mod session;
 pub mod setup;
 pub mod supervisor;
-pub mod verdict;
+pub mod verdict_text;
 pub mod version;

@@ -2,12 +2,13 @@
 //! folder that holds no run.
 
 pub mod about;
+pub mod remarks;
 
 use crate::fidelity::{self, Fidelity};
 use crate::input::rig_file;
+use crate::job::Summary;
 use crate::run_dir::{differences, missing_records, of_record, open_record, passes_in, records_in};
 use crate::sequence::{MeasuredPass, Outcome};
-use crate::session::Summary;
 use models::finger::Finger;
 use models::pass::coulomb_coefficient;
 use models::rig_file::PassNoise;

@@ -10,9 +10,9 @@ mod lock;
 mod record_facts;
 
 use crate::files::{self, Made, Placed, write_plain};
+use crate::job::Notes;
 use crate::plan::Point;
 use crate::sequence::MeasuredPass;
-use crate::session::Notes;
 use calibration::certificate::sha256_hex;
 pub use damage::{damage_in, differences, missing_records, of_record};
 pub use journal::passes_in;

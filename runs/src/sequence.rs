@@ -1,6 +1,7 @@
-//! The order of a sweep: a pure state machine over rows, beside the loop, in virtual and wall-clock time.
-//! The times of a pass are those of `plan::PassTimes`, and the longest pause is the setup's `pause_max_s`;
-//! the times of arming, zero and approach are constants.
+//! The steps of a sweep through its passes: a pure state machine over rows, beside the loop, in virtual and
+//! wall-clock time. The passes come in the order that `plan/points.rs` gives them. The times of a pass are
+//! those of `plan::PassTimes`, and the longest pause is the setup's `pause_max_s`; the times of arming, zero
+//! and approach are constants.
 //!
 //! ```text
 //! Arm -> Zero -> [ Approach -> Settle -> Measure (-> Edges) ]* -> Zero -> Over

@@ -1,8 +1,9 @@
-//! The only supervisor of the loop: rigs in wall-clock and in virtual time are driven from here.
+//! The only way to lead a loop: rigs in wall-clock and in virtual time are driven by [`sweep`].
 //!
-//! A supervisor owns ports, queue, lifeline, rings and links. Whatever ends it (an orderly end, an error, a
-//! panic, a signal), the stop goes to the loop first, then the links switch off and read back. Only a drive
-//! that was read back off is reported as off.
+//! Two types implement [`Loop`]: [`VirtualLoop`] here, and `WallLoop` in the crate `rig`, which owns queue,
+//! lifeline, rings and links. Whatever ends a sweep (an orderly end, an error, a panic, a signal), the stop
+//! goes to the loop first, then the links switch off and read back. Only a drive that was read back off is
+//! reported as off.
 
 mod virtual_time;
 
@@ -38,9 +39,9 @@ pub enum End {
     /// On request.
     Requested,
     /// The results cannot be saved.
-    NotKept,
+    NotSaved,
     /// What the finger is exposed to cannot be written.
-    ExposureNotKept,
+    ExposureNotSaved,
 }
 
 /// What whoever leads a sweep asks of it now.
@@ -71,8 +72,8 @@ pub fn sweep(
             sequence.stop();
             let why = match end {
                 End::Requested => None,
-                End::NotKept => Some(Outcome::RecordLost),
-                End::ExposureNotKept => Some(Outcome::ExposureNotKept),
+                End::NotSaved => Some(Outcome::RecordLost),
+                End::ExposureNotSaved => Some(Outcome::ExposureNotSaved),
             };
             instead = instead.or(why);
         }

@@ -14,8 +14,8 @@ use models::finger::Finger;
 use models::prediction::FrictionModel;
 use runs::fingertip::FingertipFile;
 use runs::input::{BadInput, Problems, parse_toml, unit_meant, usual};
+use runs::job::Summary;
 use runs::plan::Plan;
-use runs::session::Summary;
 use runs::setup::Setup;
 use serde::de::DeserializeOwned;
 use std::path::Path;
@@ -198,7 +198,7 @@ fn judge_text(kind: &str, name: &str, on: &On, text: &str) -> miette::Result<(Op
     match kind {
         "profile" => {
             let known = match path.exists() {
-                true => runs::rehearsal::of(path).map(drop),
+                true => runs::profile_trial::of(path).map(drop),
                 false => drivers::profile(name).map(drop).map_err(|e| e.to_string()),
             };
             known.map_err(|problem| miette::miette!("{problem}"))?;

@@ -9,20 +9,20 @@
 //! | [`passes`] | a point table from its bytes, CSV or Parquet |
 //! | [`calibrate`] | certificates from data; what only instruments give comes through a bench |
 //! | [`schemas`] | schemas from the types, commented beginnings, what is bundled |
-//! | [`verdict`] | the verdict on a table or a run, from its files to those that it is written into |
+//! | [`diagnose`] | the verdict on a table or a run, from its files to those that it is written into |
 //! | [`check`] | what is wrong with any file, and whether a plan can run on a setup |
 
 #![deny(clippy::print_stdout, clippy::print_stderr)]
 
 pub mod calibrate;
 pub mod check;
+pub mod diagnose;
 pub mod export;
 pub mod import;
 pub mod joined;
 pub mod law;
 pub mod passes;
 pub mod schemas;
-pub mod verdict;
 
 /// The answer of a build without a feature. `instead`: what serves in its place.
 pub fn built_without(feature: &str, instead: &str) -> miette::Report {

@@ -43,7 +43,7 @@ pub const ROOMS: &[&str] = &[
     "python/README.md",
     "runs/src/report/events.rs",
     "runs/src/report/page.rs",
-    "runs/src/verdict.rs",
+    "runs/src/verdict_text.rs",
     "realtime/src/compare/agreement.rs",
     "cli/src/verbs.rs",
     "cli/src/verbs/groups.rs",

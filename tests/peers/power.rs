@@ -102,8 +102,7 @@ fn judge(root: &Path, acknowledged: &BTreeSet<u64>, ended: bool) -> Result<(), S
             return Err(format!("the record: {:?}", found.sentences()));
         }
         let summary = std::fs::read(run.join("summary.json")).map_err(|e| format!("the summary: {e}"))?;
-        serde_json::from_slice::<runs::session::Summary>(&summary)
-            .map_err(|e| format!("the summary: {e}"))?;
+        serde_json::from_slice::<runs::job::Summary>(&summary).map_err(|e| format!("the summary: {e}"))?;
         let report =
             std::fs::read_to_string(run.join("report.html")).map_err(|e| format!("the report: {e}"))?;
         if !report.trim_end().ends_with("</html>") {

@@ -13,9 +13,9 @@ use models::psi_star::{Fit, PSI_EDGE, PSI_RANGE, of_conditions, of_passes};
 use models::quantity::PeakToPeak;
 use models::surrogate::Surrogate;
 use rayon::prelude::*;
+use runs::job::sweep_in_memory;
 use runs::plan::{Plan, Resolution};
 use runs::sequence::Outcome;
-use runs::session::rehearse;
 use runs::setup::Setup;
 use sim::defects::{Defects, Surroundings};
 use sim::finger::Finger;
@@ -296,9 +296,15 @@ fn a_run_states_psi_star_within_what_its_conditions_give_by_hand() {
         let (name, setup) = (format!("{plan} on {setup}"), Setup::load(setup).unwrap());
         let model = Arc::new(models::prediction::SpringSlider::new(setup.tip.finger).unwrap());
         let rig = setup.file.virtual_rig.as_ref().unwrap();
-        let run =
-            rehearse(&setup, &Plan::load(plan).unwrap(), rig.finger_seed, &rig.world(), model, &mut |_| {})
-                .unwrap();
+        let run = sweep_in_memory(
+            &setup,
+            &Plan::load(plan).unwrap(),
+            rig.finger_seed,
+            &rig.world(),
+            model,
+            &mut |_| {},
+        )
+        .unwrap();
         assert_eq!(run.outcome, Outcome::Complete);
         let own: Passes = run
             .passes
@@ -327,7 +333,7 @@ fn a_nature_gives_the_forces_of_the_rig() {
         world.sensor.wander_sd_n = [0.0; 2];
         world.stage.load_relative_sd = 0.0;
         let model = Arc::new(models::prediction::SpringSlider::new(setup.tip.finger).unwrap());
-        let run = rehearse(&setup, &plan, FIRST_SEED, &world, model, &mut |_| {}).unwrap();
+        let run = sweep_in_memory(&setup, &plan, FIRST_SEED, &world, model, &mut |_| {}).unwrap();
         for pass in &run.passes {
             let c = pass.pass.condition(1.0);
             let (force, law) = (pass.pass.friction_force_n().unwrap(), nature.force_n(&c));

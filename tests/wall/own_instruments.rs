@@ -10,8 +10,8 @@ mod rows;
 
 use realtime::safety::{Cause, Trip};
 use rows::{Fate, ROWS, Row};
+use runs::job::Summary;
 use runs::sequence::Outcome;
-use runs::session::Summary;
 use std::io::{BufRead, BufReader, Read, Write};
 use std::net::{SocketAddr, TcpStream};
 use std::path::{Path, PathBuf};

@@ -282,7 +282,7 @@ fn a_terminal_that_nobody_reads_holds_nothing_up() {
         drop(master);
         assert!(child.wait().unwrap().code().is_some());
         filler.join().unwrap();
-        let summary: runs::session::Summary =
+        let summary: runs::job::Summary =
             serde_json::from_str(&std::fs::read_to_string(out.join("summary.json")).unwrap()).unwrap();
         if matches!(summary.outcome, runs::sequence::Outcome::Tripped(_)) {
             return Some(out);

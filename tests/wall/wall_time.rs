@@ -215,7 +215,7 @@ pub fn sweep_taken_up_again(out: &Path, sweep: impl Fn() -> Command) -> Output {
 pub fn cut_by_a_stall(out: &Path) -> Option<String> {
     let said = std::fs::read_to_string(out.join("summary.json"));
     let said = said.unwrap_or_else(|e| panic!("no summary in {}: {e}", out.display()));
-    let summary: runs::session::Summary = serde_json::from_str(&said).unwrap();
+    let summary: runs::job::Summary = serde_json::from_str(&said).unwrap();
     let stalls = summary.stalls.expect("a run in wall-clock time has a monitor");
     let trip = match summary.outcome {
         runs::sequence::Outcome::Tripped(trip) => trip,

@@ -5,8 +5,8 @@
 
 use realtime::ports::Nanos;
 use realtime::safety::{Cause, Trip};
+use runs::job::Summary;
 use runs::sequence::Outcome;
-use runs::session::Summary;
 use std::io::{BufRead, BufReader};
 use std::path::{Path, PathBuf};
 use std::process::{Child, ChildStdout, Stdio};

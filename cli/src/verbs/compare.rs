@@ -37,8 +37,8 @@ pub struct Args {
 /// Compares; refused: a folder that holds no run, a run without a pass without vibration, a page that cannot
 /// be written.
 pub fn run(args: &Args, json: bool) -> miette::Result<ExitCode> {
-    super::there(&args.run_a, "run")?;
-    super::there(&args.run_b, "run")?;
+    super::must_exist(&args.run_a, "run")?;
+    super::must_exist(&args.run_b, "run")?;
     if !args.more.is_empty() || args.by.is_some() {
         return run_groups(args, json);
     }
@@ -58,7 +58,7 @@ fn run_groups(args: &Args, json: bool) -> miette::Result<ExitCode> {
     if folders.len() > MOST_COMPARED {
         miette::bail!("{} runs are more than {MOST_COMPARED}", folders.len());
     }
-    args.more.iter().try_for_each(|run| super::there(run, "run"))?;
+    args.more.iter().try_for_each(|run| super::must_exist(run, "run"))?;
     let grouped = Grouped::of(&folders, args.by.unwrap_or_default())?;
     if let Some(page) = &args.report {
         runs::files::write_output(page, runs::report::groups::page(&grouped)?)?;

@@ -10,12 +10,12 @@ use indicatif::ProgressBar;
 use runs::files::{MODEL, NEXT_PLAN, PAGE, PREDICTIONS, replaceable, write_output};
 use runs::input::{MAX_TABLE_BYTES, bytes_of};
 use runs::print::folded;
-use runs::verdict::files;
+use runs::verdict_text::files;
 use std::sync::{Arc, Mutex, PoisonError};
 use tables::check::refusal;
+use tables::diagnose::{Subject, inputs, unfit};
 use tables::joined::{Part, joined, start_of};
 use tables::passes::parse_passes;
-use tables::verdict::{self, Subject, unfit};
 
 /// Parts of the operating space that are printed, the largest first.
 const PRINTED: usize = 6;
@@ -74,8 +74,8 @@ struct Inputs<'a> {
 
 impl<'a> Inputs<'a> {
     fn of(args: &'a Args) -> miette::Result<Self> {
-        args.data.iter().try_for_each(|data| super::there(data, "run or table"))?;
-        let both = |data: &PathBuf| verdict::inputs(data, args.rig.clone());
+        args.data.iter().try_for_each(|data| super::must_exist(data, "run or table"))?;
+        let both = |data: &PathBuf| inputs(data, args.rig.clone());
         let (tables, rigs): (Vec<_>, Vec<_>) = args.data.iter().map(both).unzip();
         let bytes = |rig: &PathBuf| bytes_of(rig, MAX_TABLE_BYTES).ok();
         let rig = rigs[0].clone();
@@ -126,7 +126,7 @@ pub fn run(args: Args, json: bool) -> miette::Result<ExitCode> {
         out!("{}", document(&result, &subject.rig, &damage).into_diagnostic()?);
     } else {
         damage.iter().for_each(|d| say!("{}", folded(&format!("damaged: {d}"), 4)));
-        out!("{}", folded(runs::verdict::words(&result, &subject.rig).trim_end(), 4));
+        out!("{}", folded(runs::verdict_text::words(&result, &subject.rig).trim_end(), 4));
     }
     Ok(ExitCode::SUCCESS)
 }
@@ -215,7 +215,7 @@ fn conditions(path: &Path, subject: &Subject) -> miette::Result<Table> {
 /// Writes the corrected model and the next plan where they are requested and the verdict has them.
 fn save_next(args: &Args, result: &Diagnosis) -> miette::Result<()> {
     if let Some(out) = &args.save_model {
-        match runs::verdict::corrected_model(result)? {
+        match runs::verdict_text::corrected_model(result)? {
             Some(model) => write_output(out, model)?,
             None => say!(
                 "no model written to {}: no effect of the library explains most of the gap",
@@ -224,7 +224,7 @@ fn save_next(args: &Args, result: &Diagnosis) -> miette::Result<()> {
         }
     }
     if let Some(out) = &args.save_plan {
-        match runs::verdict::next_plan(result, &args.data) {
+        match runs::verdict_text::next_plan(result, &args.data) {
             Some(plan) => {
                 write_output(out, plan)?;
                 let all: Vec<_> = args.data.iter().map(|data| quoted(data.display())).collect();

@@ -20,7 +20,7 @@ pub struct Args {
 
 /// Converts; refused: a folder that holds no run, or a place that cannot be written.
 pub fn run(args: Args, json: bool) -> miette::Result<ExitCode> {
-    super::there(&args.run, "run")?;
+    super::must_exist(&args.run, "run")?;
     let run = runs::run_data::read(&args.run)?;
     let out = export(&args.run, &run, args.to, &args.stated, args.out.as_deref())?;
     if json {

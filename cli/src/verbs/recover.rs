@@ -19,7 +19,7 @@ pub fn run(args: Args, json: bool) -> miette::Result<ExitCode> {
     let leads_to = args.file.is_symlink().then(|| fs::canonicalize(&args.file)).and_then(Result::ok);
     let file = &leads_to.unwrap_or(args.file);
     let shown = || file.display().to_string();
-    super::there(file, "recording")?;
+    super::must_exist(file, "recording")?;
     if !fs::metadata(file).into_diagnostic().wrap_err_with(shown)?.is_file() {
         miette::bail!(help = "give a record, run-1.mcap and the like", "{} is not an ordinary file", shown());
     }

@@ -6,8 +6,8 @@ use models::law::Rendering;
 use models::prediction::FrictionModel;
 use realtime::recorder::{CYCLES, Entry, Integrity, Reader, inspect};
 use realtime::replay::{Replay, replay};
+use runs::job::{REPLAYABLE, Replayable, TARGET};
 use runs::run_dir::{missing_records, records_in};
-use runs::session::{REPLAYABLE, Replayable, TARGET};
 use std::fs::File;
 use std::io::BufReader;
 use std::sync::Arc;
@@ -33,7 +33,7 @@ struct Found {
 /// bit. It holds only where the record is whole, or was made whole by `recover` and no message is known to be
 /// missing. Refused: a record that cannot be read, or that lacks what a replay needs.
 pub fn run(args: Args, json: bool) -> miette::Result<ExitCode> {
-    super::there(&args.run, "run or recording")?;
+    super::must_exist(&args.run, "run or recording")?;
     let (records, gone) = if args.run.is_dir() {
         (records_in(&args.run)?, missing_records(&args.run)?)
     } else {
@@ -108,7 +108,7 @@ fn again(path: PathBuf) -> miette::Result<Found> {
 }
 
 fn model_of(files: &[(String, Vec<u8>)], built: &Replayable) -> miette::Result<Arc<dyn FrictionModel>> {
-    let file = files.iter().find(|(name, _)| runs::session::is_model(name));
+    let file = files.iter().find(|(name, _)| runs::job::is_model(name));
     let law = match (file, built.law) {
         (Some((name, text)), _) => {
             runs::model_file::law(&built.finger, name, &String::from_utf8_lossy(text))?

@@ -19,7 +19,7 @@ pub struct Args {
 
 /// Writes the report; refused: a folder that holds no run, or a place that cannot be written.
 pub fn run(args: Args, json: bool) -> miette::Result<ExitCode> {
-    super::there(&args.run, "run")?;
+    super::must_exist(&args.run, "run")?;
     if args.run.join(runs::campaign::FILE).is_file() {
         if !args.overlay.is_empty() {
             let help = "give the folder of one of its runs";

@@ -14,10 +14,10 @@ use rig::publish::{Broker, Publisher};
 use rig::watch::Watch;
 use runs::catalogue::runs_folder;
 use runs::files::{Made, make_folder};
+use runs::job::{Job, Notes, Signals, Summary, Update, unix_ns};
 use runs::plan::Plan;
 use runs::print::{self, clean, folded};
 use runs::sequence::{Event, Outcome};
-use runs::session::{Job, Notes, Signals, Summary, Update, unix_ns};
 use runs::setup::Setup;
 use runs::supervisor::MAY_BE_ON;
 use serde_json::Value;
@@ -162,7 +162,7 @@ fn measure(job: Job, planned: usize, args: &Args, json: bool) -> miette::Result<
     let before = runs::run_dir::passes_in(&job.out).unwrap_or_default();
     let mut feed = Feed::new(live::Run::of(&job, planned, before.len()), before, &signals);
     let continued = job.plan.file.continues.clone();
-    let summary = rig::session::run(job, &signals, &mut |update| {
+    let summary = rig::wall_run::run(job, &signals, &mut |update| {
         feed.update(&update);
         followers.update(&update);
     });
@@ -378,7 +378,7 @@ fn progress_bar(json: bool, planned: u64) -> ProgressBar {
 
 /// Says what came of a run, which may continue others, and what to do next.
 fn tell(summary: &Summary, continued: &[PathBuf], json: bool) {
-    let remarked = runs::run_data::about::Remarked::of(summary);
+    let remarked = runs::run_data::remarks::Remarked::of(summary);
     if json {
         answer_json(&json!({ "summary": remarked }));
         return;

@@ -62,7 +62,7 @@ pub fn run(args: Args, json: bool) -> miette::Result<ExitCode> {
 
 /// The tags and the note after the changes; written only where there are any.
 fn annotate(run: &Path, args: &Args) -> miette::Result<Annotations> {
-    super::there(run, "run")?;
+    super::must_exist(run, "run")?;
     let before = Annotations::read(run)?;
     let mut after = before.clone();
     after.tags.extend(args.tag.iter().cloned());

@@ -12,7 +12,7 @@ use crate::rig_lock::RigLock;
 use drive::Drive;
 use drivers::vibrometer::Settings;
 use models::quantity::PeakToPeak;
-use runs::session::Unfinished;
+use runs::job::Unfinished;
 use runs::setup::Setup;
 use runs::{ask, say};
 use std::fmt::Write as _;

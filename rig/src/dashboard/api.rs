@@ -15,7 +15,7 @@ use runs::report::{EXPLORE, FIGURES, UPLOT, UPLOT_STYLE, scoped_style};
 use serde::Deserialize;
 use std::sync::{Arc, PoisonError};
 use std::time::Duration;
-use tables::verdict::diagnose_run;
+use tables::diagnose::diagnose_run;
 
 /// Largest body of a request in bytes.
 const BODY: usize = 256;

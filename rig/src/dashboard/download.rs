@@ -4,7 +4,7 @@ use axum::body::{Body, Bytes};
 use axum::http::header;
 use axum::response::{IntoResponse, Response};
 use hyper::body::Frame;
-use runs::verdict::files;
+use runs::verdict_text::files;
 use std::fs::{File, OpenOptions};
 use std::io::Read;
 use std::path::Path;

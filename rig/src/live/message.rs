@@ -3,8 +3,8 @@
 use realtime::cycle::Phase;
 use realtime::ports::Channel;
 use realtime::safety::Cause;
+use runs::job::{Deadlines, Extremes, Job, Snapshot, unix_ns};
 use runs::sequence::{Event, MeasuredPass, Outcome};
-use runs::session::{Deadlines, Extremes, Job, Snapshot, unix_ns};
 use runs::setup::Guards;
 use serde::{Deserialize, Serialize};
 use std::path::PathBuf;
@@ -225,7 +225,7 @@ pub struct Ended {
 
 impl Ended {
     /// Of what a session returned.
-    pub fn of(summary: &miette::Result<runs::session::Summary>) -> Self {
+    pub fn of(summary: &miette::Result<runs::job::Summary>) -> Self {
         match summary {
             Ok(summary) => Ended {
                 outcome: Some(summary.outcome.clone()),

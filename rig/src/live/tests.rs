@@ -3,8 +3,8 @@
 use super::*;
 use models::condition::Condition;
 use models::pass::Pass;
+use runs::job::{Signals, Update};
 use runs::sequence::{Event, MeasuredPass};
-use runs::session::{Signals, Update};
 use std::io::{Read, Write};
 use std::os::unix::net::UnixStream;
 use std::sync::atomic::Ordering;

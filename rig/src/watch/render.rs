@@ -5,7 +5,7 @@ use crate::terminal;
 use ratatui_core::buffer::{Buffer, Cell};
 use ratatui_core::layout::Rect;
 use ratatui_core::style::{Color, Modifier};
-use runs::session::unix_ns;
+use runs::job::unix_ns;
 use std::io::Write;
 use std::time::Duration;
 

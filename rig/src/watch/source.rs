@@ -2,8 +2,8 @@
 
 use super::{Shared, Source};
 use crate::live::{Ended, Heard, Progress, Run, Viewer};
+use runs::job::Summary;
 use runs::run_dir::{self, passes_in};
-use runs::session::Summary;
 use runs::setup::Guards;
 use std::path::Path;
 use std::time::{Duration, Instant};

@@ -8,8 +8,8 @@ use realtime::compare::PassComparison;
 use realtime::cycle::Phase;
 use realtime::ports::Nanos;
 use realtime::safety::{Cause, Trip, Unit};
+use runs::job::Extremes;
 use runs::sequence::{Event, MeasuredPass, Outcome};
-use runs::session::Extremes;
 
 const PLAIN: Look = Look { colour: false, unicode: false };
 

@@ -3,7 +3,7 @@
 
 use super::RunEntry;
 use crate::run_dir::identity_in;
-use crate::verdict::files::{CORRECTED_MODEL, NEXT_PLAN};
+use crate::verdict_text::files::{CORRECTED_MODEL, NEXT_PLAN};
 use calibration::certificate::sha256_hex;
 use serde::Serialize;
 use std::path::Path;

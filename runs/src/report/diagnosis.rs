@@ -14,10 +14,11 @@ use super::html::{bar, cell, columns, escape, glossary, head, list, note, numeri
 use super::plots::verdict::{Seen, errors_against};
 use super::plots::{beyond, ends};
 use crate::human::number;
-use crate::verdict::{listed, looks_like, name, plain};
+use crate::verdict_text::{listed, looks_like, name};
 use diagnosis::Verdict;
 use diagnosis::data::Table;
-use diagnosis::describe::probability;
+use diagnosis::format::plain;
+use diagnosis::format::probability;
 use diagnosis::left_out::Errors;
 use diagnosis::predict::Forecast;
 use diagnosis::scatter::Suspect;

@@ -3,7 +3,7 @@
 use super::html::{columns, escape, table};
 use crate::ambient::AIR;
 use crate::human::number;
-use crate::run_data::about::ZERO_SHARE;
+use crate::run_data::remarks::ZERO_SHARE;
 use crate::sequence::Event;
 use realtime::safety::Cause;
 

@@ -4,9 +4,9 @@
 use super::events::describe;
 use super::traces::Trace;
 use crate::human::rounded;
+use crate::job::{REPLAYABLE, Replayable};
 use crate::run_data::RunData;
 use crate::sequence::MeasuredPass;
-use crate::session::{REPLAYABLE, Replayable};
 use models::quantity::PeakToPeak;
 
 /// The figures of the dashboard and of a run's page, a module.

@@ -8,7 +8,7 @@ use super::{events, explore, fidelity, plots, published};
 use crate::ambient::{AIR, LevelsFound, levels_of};
 use crate::human::number;
 use crate::input::unit_of;
-use crate::run_data::{RunData, about};
+use crate::run_data::{RunData, remarks};
 use crate::sequence::{Outcome, Zeros};
 use models::condition::Ambient;
 use std::fmt::Write;
@@ -78,7 +78,7 @@ fn verdict(w: &mut String, run: &RunData) {
     let class = if departed.is_some() { "verdict departed" } else { "verdict" };
     let _ = writeln!(w, "<p class=\"{class}\">{finding}<br>{outcome}{psi_star}</p>");
     let zeros = run.summary.as_ref().map_or_else(Zeros::default, |s| s.zeros);
-    for remark in about::remarks(&run.passes, &zeros) {
+    for remark in remarks::of_passes(&run.passes, &zeros) {
         let _ = writeln!(w, "<p class=\"verdict departed\">{}.</p>", escape(&remark));
     }
     if !run.damage.is_empty() {

@@ -17,7 +17,7 @@ use std::path::Path;
 /// # Errors
 /// A folder that holds no run, or lacks its table or its journal; a table or journal that is damaged.
 pub fn passes_in(path: &Path) -> miette::Result<Vec<MeasuredPass>> {
-    there(path)?;
+    must_exist(path)?;
     let read = |name: &str| {
         let file = path.join(name);
         fs::read(&file).into_diagnostic().wrap_err_with(|| file.display().to_string())
@@ -32,7 +32,7 @@ pub fn passes_in(path: &Path) -> miette::Result<Vec<MeasuredPass>> {
 }
 
 /// Refuses a folder without table or journal.
-fn there(path: &Path) -> miette::Result<()> {
+fn must_exist(path: &Path) -> miette::Result<()> {
     let shown = path.display();
     match (path.join(POINTS).exists(), path.join(JOURNAL).exists()) {
         (true, true) => Ok(()),

@@ -7,7 +7,7 @@
 //!               -> Arm -> Zero -> next pass
 //! ```
 //! Nothing vibrates and nothing moves while it waits. Answers and readings come from whoever serves the sweep
-//! ([`crate::ambient::Bench`]); this file only decides, so it runs in virtual time as in wall-clock time.
+//! ([`crate::ambient::RigSide`]); this file only decides, so it runs in virtual time as in wall-clock time.
 
 use super::{Event, Outcome, QUIET_WITHIN, Reaction, STANDS_M_S, Sequence, Stage, Sums, awake};
 use crate::ambient::{AIR, By, Found, Level, Means, OfAir, Source, possible, shown};

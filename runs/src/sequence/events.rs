@@ -289,7 +289,8 @@ pub enum Outcome {
     RecordLost,
     /// What the finger was exposed to could not be written in time: nothing is driven that is not counted.
     /// What was measured is stored.
-    ExposureNotKept,
+    #[serde(rename = "exposure_not_kept")]
+    ExposureNotSaved,
 }
 
 impl Outcome {
@@ -315,7 +316,7 @@ impl Outcome {
                 "check the chamber and its sensor, or give more time or a wider band in `[tolerances]` of the plan",
             ),
             Outcome::LoopLost => Some("'muprime doctor' tells what stalls the computer"),
-            Outcome::RecordLost | Outcome::ExposureNotKept => {
+            Outcome::RecordLost | Outcome::ExposureNotSaved => {
                 Some("make room on the disk, and check that nothing else holds up its writing")
             }
             _ => self.cause().map(Cause::remedy),
@@ -350,7 +351,7 @@ impl Outcome {
             }
             Outcome::LoopLost => "nothing was heard of the loop".into(),
             Outcome::RecordLost => "the record could not be saved".into(),
-            Outcome::ExposureNotKept => "the exposure of the finger could not be written in time".into(),
+            Outcome::ExposureNotSaved => "the exposure of the finger could not be written in time".into(),
         }
     }
 }

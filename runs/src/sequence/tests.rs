@@ -121,8 +121,8 @@ fn each_end_from_outside_has_its_own_outcome() {
     let world = sim::world::WorldConfig::ideal();
     for (end, outcome) in [
         (End::Requested, Outcome::Stopped),
-        (End::NotKept, Outcome::RecordLost),
-        (End::ExposureNotKept, Outcome::ExposureNotKept),
+        (End::NotSaved, Outcome::RecordLost),
+        (End::ExposureNotSaved, Outcome::ExposureNotSaved),
     ] {
         let (passes, events, rows, found) = swept_on(&world, 600.0, |_| false, Some((1.0, end)));
         assert_eq!(found, outcome);

@@ -10,7 +10,7 @@ use models::finger::Finger;
 use models::pass::coulomb_coefficient;
 use models::prediction::Regime;
 use models::quantity::PeakToPeak;
-use runs::campaign::Session;
+use runs::campaign::CampaignRun;
 use runs::fingertip::FingertipKind;
 use runs::report::levels::Levels;
 use runs::report::plots::ends;
@@ -43,7 +43,7 @@ pub struct Driven {
 /// What one complete session measured.
 pub struct Measured {
     /// The session.
-    pub session: Session,
+    pub session: CampaignRun,
     /// Kind of its tip.
     pub kind: FingertipKind,
     /// Its finger, as `rig.toml` has it.
@@ -56,7 +56,7 @@ pub struct Measured {
 
 impl Measured {
     /// The passes of a session.
-    pub fn new(session: Session, kind: FingertipKind, finger: Finger, passes: &[MeasuredPass]) -> Self {
+    pub fn new(session: CampaignRun, kind: FingertipKind, finger: Finger, passes: &[MeasuredPass]) -> Self {
         let mu0 = coulomb_coefficient(passes.iter().map(|p| &p.pass)).filter(|mu0| *mu0 > 0.0);
         let driven = |p: &MeasuredPass| {
             let (mu0, friction) = (mu0?, p.pass.friction_force_n()?);

@@ -226,7 +226,7 @@ fn collapse(file: &CampaignFile, made: &[Measured]) -> miette::Result<String> {
 }
 
 fn session_table(file: &CampaignFile, made: &[Measured]) -> String {
-    let row = |session: runs::campaign::Session| {
+    let row = |session: runs::campaign::CampaignRun| {
         let done = made.iter().find(|s| s.session.number == session.number);
         let (folder, cell) = (escape(&session.folder.display().to_string()), &file.cell[session.cell]);
         let (state, mu0, passes, link) = match done {

@@ -7,8 +7,8 @@ use super::run::{Entry, portions};
 use super::shard::{Facts, Reader, Writer};
 use super::study::Study;
 use miette::{Context, IntoDiagnostic};
+use runs::job::Unfinished;
 use runs::say;
-use runs::session::Unfinished;
 use serde_json::Value;
 use sha2::{Digest, Sha256};
 use std::fs;
@@ -53,7 +53,7 @@ pub fn work(study: &Study, range: Range<u64>, program: &str, job: Option<&Path>)
     let written = write(study, &range, program, BufWriter::new(file), &cancelled);
     let moved = written.and_then(|failed| {
         let Some(failed) = failed else { return Ok(None) };
-        runs::files::make_folder(place.parent().unwrap_or(&study.out)).wrap_err(Unfinished::NotKept)?;
+        runs::files::make_folder(place.parent().unwrap_or(&study.out)).wrap_err(Unfinished::NotSaved)?;
         fs::rename(&part, &place).into_diagnostic().wrap_err_with(|| place.display().to_string())?;
         Ok(Some(failed))
     });
@@ -62,7 +62,7 @@ pub fn work(study: &Study, range: Range<u64>, program: &str, job: Option<&Path>)
     }
     let Some(failed) = moved? else { return Ok(Done::Cancelled) };
     crash_points::here("moved");
-    runs::files::sync_folder_of(&place).into_diagnostic().wrap_err(Unfinished::NotKept)?;
+    runs::files::sync_folder_of(&place).into_diagnostic().wrap_err(Unfinished::NotSaved)?;
     crash_points::here("folder-synced");
     Ok(Done::Made { failed })
 }
@@ -98,7 +98,7 @@ fn write(
     to: BufWriter<fs::File>,
     cancelled: &dyn Fn() -> bool,
 ) -> miette::Result<Option<u64>> {
-    let mut writer = Writer::new(study.kind, to).wrap_err(Unfinished::NotKept)?;
+    let mut writer = Writer::new(study.kind, to).wrap_err(Unfinished::NotSaved)?;
     let (mut keys, mut failed) = (Sha256::new(), 0);
     let line = |line: miette::Result<(u64, Option<Value>)>| {
         line.and_then(|(index, line)| Ok((index, study.case(index, line.as_ref())?)))
@@ -107,7 +107,7 @@ fn write(
         portions(study.kind, study.file.lines(range.clone())?.map(line), cancelled, &mut |entry: Entry| {
             keys.update(entry.key);
             failed += u64::from(entry.outcome.is_err());
-            writer.push(entry).wrap_err(Unfinished::NotKept)?;
+            writer.push(entry).wrap_err(Unfinished::NotSaved)?;
             crash_points::here("half-written");
             Ok(())
         })?;
@@ -115,11 +115,11 @@ fn write(
         return Ok(None);
     }
     let facts = facts(study, range, program, hex(&keys.finalize()));
-    let to = writer.end(&facts).wrap_err(Unfinished::NotKept)?;
+    let to = writer.end(&facts).wrap_err(Unfinished::NotSaved)?;
     let file = to.into_inner().map_err(std::io::IntoInnerError::into_error).into_diagnostic();
-    let file = file.wrap_err(Unfinished::NotKept)?;
+    let file = file.wrap_err(Unfinished::NotSaved)?;
     crash_points::here("written");
-    file.sync_all().into_diagnostic().wrap_err(Unfinished::NotKept)?;
+    file.sync_all().into_diagnostic().wrap_err(Unfinished::NotSaved)?;
     crash_points::here("synced");
     Ok(Some(failed))
 }

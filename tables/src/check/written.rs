@@ -2,14 +2,14 @@
 
 use super::place::{problems_of, remedy};
 use super::{Good, On, judge, kind_of, read_json, shape};
+use crate::diagnose::unfit;
 use crate::import::{as_csv, remarks};
 use crate::schemas::schema::Kind;
-use crate::verdict::unfit;
 use miette::{IntoDiagnostic, WrapErr};
 use runs::input::{MAX_TABLE_BYTES, Problems, bytes_of};
+use runs::job::Summary;
 use runs::run_dir::RUN_AGAIN;
 use runs::sequence::Zeros;
-use runs::session::Summary;
 use std::path::Path;
 
 /// A point table, as a diagnosis would take it; one of conditions has no lateral force.
@@ -108,7 +108,7 @@ pub(super) fn run_folder(path: &Path) -> miette::Result<Good> {
     problems.extend(damage);
     if problems.is_empty() {
         let zeros = Summary::written_in(path).map_or_else(Zeros::default, |summary| summary.zeros);
-        remarks.extend(runs::run_data::about::remarks(&runs::run_dir::passes_in(path)?, &zeros));
+        remarks.extend(runs::run_data::remarks::of_passes(&runs::run_dir::passes_in(path)?, &zeros));
         return Ok(Good { kind: "run", passes: Some(passes), remarks });
     }
     let mut printed = std::collections::BTreeSet::new();

@@ -34,7 +34,7 @@ pub fn bytes(folder: &Path, run: &RunData, facts: &Facts, place: &Path) -> miett
     let Some(began) = facts.get("date").filter(|date| date.starts_with(|c: char| c.is_ascii_digit())) else {
         miette::bail!("the folder does not say when the run began: {} has no sessions", folder.display());
     };
-    let address = runs::session::licence::address_of(licence)?;
+    let address = runs::job::licence::address_of(licence)?;
     let files = files_of(folder)?;
     let ids: Vec<Value> = files.iter().map(|file| json!({ "@id": file["@id"] })).collect();
     let plan = facts.get("plan").map_or("a plan", String::as_str);

@@ -47,7 +47,7 @@ pub fn of(run: &RunData, stated: &Stated) -> Facts {
     facts
 }
 
-fn outcome(summary: &runs::session::Summary) -> String {
+fn outcome(summary: &runs::job::Summary) -> String {
     let outcome = serde_json::to_value(&summary.outcome).unwrap_or_default();
     outcome["outcome"].as_str().unwrap_or("unknown").to_string()
 }

@@ -1,9 +1,9 @@
 //! A dashboard that is served, and a run whose messages come at the pace of a clock.
 
 use rig::live::{Ended, Feed, Run};
+use runs::job::{Job, Notes, Signals, Update};
 use runs::plan::Plan;
 use runs::sequence::Event;
-use runs::session::{Job, Notes, Signals, Update};
 use runs::setup::Setup;
 use serde_json::Value;
 use std::io::{BufRead, BufReader, Read, Write};
@@ -106,7 +106,7 @@ impl Paced {
             let planned = job.points().unwrap().len();
             let as_by_a_clock = Run { fast: false, ..Run::of(&job, planned, 0) };
             let mut feed = Feed::new(as_by_a_clock, Vec::new(), &asked);
-            let summary = rig::session::run(job, &asked, &mut |update| {
+            let summary = rig::wall_run::run(job, &asked, &mut |update| {
                 feed.update(&update);
                 if matches!(update, Update::State(_)) {
                     std::thread::sleep(pace);

@@ -3,7 +3,7 @@
 use super::{Args, folder as folder_of, job_of, measure, serve};
 use crate::verbs::prelude::*;
 use runs::campaign::{self, Campaign};
-use runs::session::Job;
+use runs::job::Job;
 use studies::campaign::claims::Claim;
 
 /// The page of a campaign, in its folder.
@@ -28,7 +28,7 @@ pub fn run(mut args: Args, text: &str, folder: &Path, json: bool) -> miette::Res
     })?;
     let (out, _made) = folder_of(args.out.take().or(resumed), &campaign.file.name)?;
     let given = args.clone();
-    let job = |session: &campaign::Session| -> miette::Result<Job> {
+    let job = |session: &campaign::CampaignRun| -> miette::Result<Job> {
         let cell = &campaign.file.cell[session.cell];
         let setup = campaign.setups[session.cell].clone();
         let mut job = job_of(&given, setup, campaign.plan.clone(), session.seed, out.join(&session.folder))?;
@@ -52,7 +52,7 @@ pub fn run(mut args: Args, text: &str, folder: &Path, json: bool) -> miette::Res
         let job = job(session)?;
         let instruments = !job.fast && job.setup.file.virtual_rig.is_none();
         if !json {
-            let campaign::Session { number, block, .. } = session;
+            let campaign::CampaignRun { number, block, .. } = session;
             let (comma, condition) = (if cell.condition.is_empty() { "" } else { ", " }, &cell.condition);
             say!("session {number} of {}, block {block}: {}{comma}{condition}", all.len(), cell.name);
         }

@@ -3,8 +3,8 @@
 use super::super::prelude::*;
 use clap::ValueEnum;
 use models::prediction::SpringSlider;
+use runs::job::{Job, Notes, Signals};
 use runs::plan::Plan;
-use runs::session::{Job, Notes, Signals};
 use runs::setup::Setup;
 use std::fmt::Write;
 use std::sync::Arc;
@@ -68,7 +68,7 @@ pub fn write(sample: Sample, folder: &Path) -> miette::Result<PathBuf> {
         notes: Notes { sample: Some(format!("sample of muprime: {}", sample.tip())), ..Notes::default() },
         answers: None,
     };
-    rig::session::run(job, &Signals::default(), &mut |_| {})?;
+    rig::wall_run::run(job, &Signals::default(), &mut |_| {})?;
     let table = folder.join("points.csv");
     if sample != Sample::Foreign {
         return Ok(table);

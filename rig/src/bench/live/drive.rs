@@ -8,7 +8,7 @@ use realtime::cycle::{Command, Marker};
 use realtime::pacing;
 use realtime::safety::{Cause, Request, Trip};
 use realtime::turn::{Ports, Row};
-use runs::session::Unfinished;
+use runs::job::Unfinished;
 use runs::setup::Setup;
 use runs::supervisor::{Loop, OffReport};
 use std::sync::atomic::{AtomicBool, Ordering};

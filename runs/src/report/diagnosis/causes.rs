@@ -4,8 +4,9 @@
 use super::mechanism::drawing;
 use super::overlay::Overlay;
 use crate::report::html::{bar, cell, columns, escape, numeric, row, table};
-use crate::verdict::{EXPLAINED, aliases, estimate, name, plain};
-use diagnosis::describe::probability;
+use crate::verdict_text::{EXPLAINED, aliases, estimate, name};
+use diagnosis::format::plain;
+use diagnosis::format::probability;
 use diagnosis::intervals::Estimate;
 use diagnosis::verdict::{Diagnosis, Hypothesis};
 

@@ -6,7 +6,7 @@ use crate::human::{settings, titled};
 use crate::report::html::{escape, note};
 use crate::report::plots::verdict::{LawPass, law};
 use crate::report::plots::{Span, ends};
-use crate::verdict::plain;
+use diagnosis::format::plain;
 use diagnosis::predict::Forecast;
 use diagnosis::verdict::Hypothesis;
 use models::condition::Condition;

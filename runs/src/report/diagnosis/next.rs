@@ -36,7 +36,7 @@ fn one(e: &Experiment) -> String {
          <code>muprime run next-plan.toml</code> measures them.</p></div>",
         e.conditions.len(),
         table("Passes of the next experiment", &heads, e.conditions.iter().map(row)),
-        as_address(&crate::verdict::plan(e, &[]))
+        as_address(&crate::verdict_text::plan(e, &[]))
     )
 }
 

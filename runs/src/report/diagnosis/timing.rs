@@ -3,7 +3,7 @@
 use crate::human::number;
 use crate::report::html::{columns, escape, note, numeric, row, table};
 use crate::report::plots::verdict::edge;
-use diagnosis::describe::probability;
+use diagnosis::format::probability;
 use diagnosis::timing::{Comparison, Form, FormNote, title};
 use diagnosis::verdict::Diagnosis;
 

@@ -9,8 +9,8 @@ use miette::Context;
 use runs::input::{MAX_TABLE_BYTES, bytes_of, rig_text, text_of};
 use serde::{Deserialize, Serialize};
 use std::path::{Path, PathBuf};
+use tables::diagnose::{Subject, inputs};
 use tables::passes::parse_passes;
-use tables::verdict::{Subject, inputs};
 
 /// The kind.
 pub const KIND: CaseKind = CaseKind {

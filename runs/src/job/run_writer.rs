@@ -5,7 +5,7 @@
 use super::{Job, Notes, Summary, Unfinished, Update};
 use crate::ambient::levels_of;
 use crate::files::Placed;
-use crate::run_data::about::Remarked;
+use crate::run_data::remarks::Remarked;
 use crate::run_dir::{RunDir, SUMMARY};
 use crate::sequence::{Event, MeasuredPass, Outcome, Zero, Zeros};
 use crate::setup::Guards;
@@ -59,7 +59,7 @@ pub struct Replayable {
 }
 
 /// The open files of a run.
-pub struct Keeper {
+pub struct RunWriter {
     dir: RunDir,
     passes: usize,
     planned: usize,
@@ -131,10 +131,10 @@ fn write_rig(job: &Job, dir: &RunDir) -> miette::Result<()> {
     dir.write("rig.toml", job.setup.rig_file().to_toml().into_diagnostic()?.as_bytes())
 }
 
-impl Keeper {
+impl RunWriter {
     /// Begins a session of the run.
     pub fn begin(job: &Job, mut dir: RunDir, planned: usize) -> miette::Result<Self> {
-        dir.begin().and_then(|()| Self::of(job, dir, planned)).wrap_err(Unfinished::NotKept)
+        dir.begin().and_then(|()| Self::of(job, dir, planned)).wrap_err(Unfinished::NotSaved)
     }
 
     /// The end of a run whose passes were all made in earlier sessions: nothing is driven. What an earlier
@@ -154,17 +154,17 @@ impl Keeper {
         {
             return Ok(Summary { folder: dir.path().to_path_buf(), finished_before: true, ..summary });
         }
-        let keeper = Self::of(job, dir, planned).wrap_err(Unfinished::NotKept)?;
+        let writer = Self::of(job, dir, planned).wrap_err(Unfinished::NotSaved)?;
         Ok(Summary {
             finished_before: true,
-            ..keeper.end(Outcome::Complete, agreement, None, 0, BTreeMap::new(), OffReport::off())
+            ..writer.end(Outcome::Complete, agreement, None, 0, BTreeMap::new(), OffReport::off())
         })
     }
 
     fn of(job: &Job, dir: RunDir, planned: usize) -> miette::Result<Self> {
         write_rig(job, &dir)?;
         let (passes, protocol, guards) = (dir.made.len(), job.plan.protocol(), job.setup.guards());
-        Ok(Keeper { dir, passes, planned, protocol, guards, zeros: Zeros::default() })
+        Ok(RunWriter { dir, passes, planned, protocol, guards, zeros: Zeros::default() })
     }
 
     /// Keeps what a row led to and passes it on. Returns the pass, once it is safe.
@@ -172,7 +172,7 @@ impl Keeper {
     /// # Errors
     /// Whatever the file system says: the sweep must stop then. Passes that come until it has stopped may
     /// still be given here: they are written where they can be.
-    pub fn keep(
+    pub fn save(
         &mut self,
         events: &[Event],
         pass: Option<&MeasuredPass>,
@@ -253,7 +253,7 @@ impl Keeper {
 
     /// A new record file of the run.
     pub fn new_record(&self) -> miette::Result<Placed> {
-        self.dir.new_record().wrap_err(Unfinished::NotKept)
+        self.dir.new_record().wrap_err(Unfinished::NotSaved)
     }
 }
 

@@ -1,12 +1,10 @@
 //! A verdict for people: what a terminal shows, and the plan of the best next experiment.
 
-pub mod edges;
 pub mod files;
 
 use crate::human::{quantity, with_interval};
 use diagnosis::certificates;
-pub(crate) use diagnosis::describe::plain;
-use diagnosis::describe::probability;
+use diagnosis::format::{plain, probability};
 use diagnosis::intervals::{Estimate, Shape};
 use diagnosis::locate::Region;
 use diagnosis::verdict::{Diagnosis, Hypothesis};
@@ -14,7 +12,7 @@ use miette::IntoDiagnostic;
 use models::condition::Condition;
 use models::covariate::{self, Covariate};
 use models::rig_file::RigFile;
-use std::path::{Path, PathBuf};
+use std::path::PathBuf;
 
 /// Parts of the operating space that are named, the largest first.
 const PARTS: usize = 6;
@@ -25,17 +23,6 @@ const LEAST_SHARE: f64 = 0.01;
 const ALIASES: usize = 4;
 /// Probability from which a hypothesis is explained: its parameters, and what it cannot be separated from.
 pub const EXPLAINED: f64 = 0.05;
-
-/// Adds what a run's record says of time to a verdict on its passes; a folder without a record adds nothing.
-///
-/// # Errors
-/// A record that cannot be opened.
-pub fn add_record(result: &mut Diagnosis, run: &Path, rig: &RigFile) -> miette::Result<()> {
-    if !crate::run_dir::records_in(run)?.is_empty() {
-        result.add_record(edges::of_run(run, rig.finger)?);
-    }
-    Ok(())
-}
 
 /// The verdict for a person, certificates included.
 pub fn words(result: &Diagnosis, rig: &RigFile) -> String {

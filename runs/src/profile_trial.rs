@@ -12,7 +12,7 @@ use sim::wire::world::WorldPlant;
 use sim::world::{World, WorldConfig};
 use std::path::Path;
 
-/// Rehearses the profile in a file; an error says what is wrong with it, with the place where it is known.
+/// Tries the profile in a file; an error says what is wrong with it, with the place where it is known.
 pub fn of(path: &Path) -> Result<(), String> {
     let profile =
         Source::read(path).and_then(|source| source.profile()).map_err(|error| error.to_string())?;
@@ -127,7 +127,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn every_bundled_profile_stands_its_rehearsal() {
+    fn every_bundled_profile_passes_its_trial() {
         for id in drivers::bundled::ids() {
             let profile = drivers::profile(id).unwrap();
             let all = line(&profile).and_then(|()| vectors(&profile)).and_then(|()| second(profile));

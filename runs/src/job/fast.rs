@@ -1,9 +1,9 @@
 //! A sweep in virtual time: one thread, no clock, the same bytes for the same seed.
 
-use super::keeper::{self, Keeper};
+use super::run_writer::{self, RunWriter};
 use super::telemetry::Snapshots;
 use super::{Begun, Job, Signals, Summary, Update};
-use crate::ambient::{Answers, Bench, World};
+use crate::ambient::{Answers, RigSide, World};
 use crate::files::Placed;
 use crate::plan::{Plan, Resolution};
 use crate::sequence::{MeasuredPass, Outcome, Reaction, Sequence};
@@ -43,18 +43,18 @@ pub fn run(
     }
     let world = VirtualRig { world: job.world()? }.split();
     let air = World::Virtual(world[0].clone());
-    let mut bench = Bench::open(&sequence, None, Some(air), answers)?;
+    let mut rig_side = RigSide::open(&sequence, None, Some(air), answers)?;
     let ports = ports_of(&job, world);
-    let preamble = keeper::preamble(&job, EPOCH_UNIX_NS)?;
-    let mut keeper = Keeper::begin(&job, dir, planned)?;
+    let preamble = run_writer::preamble(&job, EPOCH_UNIX_NS)?;
+    let mut writer = RunWriter::begin(&job, dir, planned)?;
     let rig =
         VirtualLoop::new(job.setup.config, Arc::clone(&job.model), ports).from(Nanos::from_seconds(start_s));
-    let record = keeper.new_record().and_then(|file| {
+    let record = writer.new_record().and_then(|file| {
         let disk = file.handle()?;
         Ok((Recorder::begin(file, preamble).into_diagnostic()?, disk))
     });
     let (swept, off) = match record {
-        Ok(record) => sweep(rig, record, &mut keeper, (&mut sequence, &mut bench), signals, update),
+        Ok(record) => sweep(rig, record, &mut writer, (&mut sequence, &mut rig_side), signals, update),
         // Before the first row nothing has been driven.
         Err(why) => (Err(why), OffReport::off()),
     };
@@ -63,7 +63,7 @@ pub fn run(
         Outcome::RecordLost
     });
     let agreement = sequence.agreement(outcome == Outcome::Complete);
-    Ok(keeper.end(outcome, agreement, None, 0, BTreeMap::new(), off))
+    Ok(writer.end(outcome, agreement, None, 0, BTreeMap::new(), off))
 }
 
 /// What the loop of a job has to do with: the virtual rig, through the setup's certificates.
@@ -83,31 +83,31 @@ fn ports_of(job: &Job, [force, amplifier, stage]: [SharedRig; 3]) -> Ports {
 fn sweep(
     mut rig: VirtualLoop,
     (mut recorder, disk): (Recorder<Placed>, Placed),
-    keeper: &mut Keeper,
-    (sequence, bench): (&mut Sequence, &mut Bench),
+    writer: &mut RunWriter,
+    (sequence, rig_side): (&mut Sequence, &mut RigSide),
     signals: &Signals,
     update: &mut dyn FnMut(Update<'_>),
 ) -> (miette::Result<Outcome>, OffReport) {
     // A failure to save ends the sweep.
-    let unkept = RefCell::new(None);
+    let unsaved = RefCell::new(None);
     let mut knows = false;
     let mut ask = || {
         // In virtual time there is nothing to wait for: a pause would only fill the record.
         let ends = |end| Requests { end, pause: false };
-        if !knows && unkept.borrow().is_some() {
+        if !knows && unsaved.borrow().is_some() {
             knows = true;
-            return ends(Some(End::NotKept));
+            return ends(Some(End::NotSaved));
         }
         ends((signals.stops.swap(0, Ordering::Relaxed) > 0).then_some(End::Requested))
     };
     let mut snapshots = Snapshots::of(EPOCH_UNIX_NS, rig.period());
-    let mut keep = |row: &Row, sequence: &Sequence, reaction: Reaction| -> miette::Result<()> {
+    let mut save = |row: &Row, sequence: &Sequence, reaction: Reaction| -> miette::Result<()> {
         recorder.row(row).into_diagnostic()?;
         if let Some(snapshot) = snapshots.take(row) {
             update(Update::State(&snapshot));
         }
-        keeper::record(&mut recorder, row.now, &reaction.events, reaction.pass.as_ref())?;
-        keeper.keep(&reaction.events, reaction.pass.as_ref(), update)?;
+        run_writer::record(&mut recorder, row.now, &reaction.events, reaction.pass.as_ref())?;
+        writer.save(&reaction.events, reaction.pass.as_ref(), update)?;
         if reaction.pass.is_some() {
             disk.still_there()?;
             let (done, all) = sequence.progress();
@@ -119,9 +119,9 @@ fn sweep(
         Ok(())
     };
     let outcome = supervisor::sweep(&mut rig, sequence, &mut ask, &mut |row, sequence, reaction| {
-        bench.serve(row.now, sequence, &reaction);
-        if unkept.borrow().is_none() {
-            *unkept.borrow_mut() = keep(row, sequence, reaction).err();
+        rig_side.serve(row.now, sequence, &reaction);
+        if unsaved.borrow().is_none() {
+            *unsaved.borrow_mut() = save(row, sequence, reaction).err();
         }
     });
     // The stop reaches the rig, so that the record shows the safe state; saved or not, off comes first.
@@ -132,9 +132,9 @@ fn sweep(
         }
     });
     let ended = || {
-        unkept.into_inner().map_or(Ok(()), Err)?;
+        unsaved.into_inner().map_or(Ok(()), Err)?;
         recorded.into_diagnostic()?;
-        let last = BTreeMap::from([("outcome".to_string(), words(&outcome)?)]);
+        let last = BTreeMap::from([("outcome".to_string(), outcome_json(&outcome)?)]);
         recorder.end(last).into_diagnostic().wrap_err("the record")?;
         disk.sync()?;
         Ok(outcome)
@@ -144,7 +144,7 @@ fn sweep(
 
 /// What a sweep in memory comes to.
 #[derive(Clone, Debug)]
-pub struct Rehearsal {
+pub struct MemorySweep {
     /// The passes.
     pub passes: Vec<MeasuredPass>,
     /// How it ended.
@@ -160,14 +160,14 @@ pub struct Rehearsal {
 ///
 /// # Errors
 /// A plan that the limits do not allow, or a world that cannot be.
-pub fn rehearse(
+pub fn sweep_in_memory(
     setup: &Setup,
     plan: &Plan,
     seed: u64,
     world: &sim::world::WorldConfig,
     model: Arc<dyn FrictionModel>,
     each: &mut dyn FnMut(&Row),
-) -> miette::Result<Rehearsal> {
+) -> miette::Result<MemorySweep> {
     let resolution = Resolution { amplitude_pp_m: 1e-9, frequency_hz: 0.1 };
     let points = plan.points(seed, &setup.config.limits, &resolution)?;
     let mut sequence =
@@ -176,21 +176,21 @@ pub fn rehearse(
     let [force, amplifier, stage] =
         VirtualRig::new(world, seed).map_err(|e| miette::miette!("the virtual rig: {e}"))?.split();
     let air = World::Virtual(force.clone());
-    let mut bench = Bench::open(&sequence, None, Some(air), Answers::Simulated)?;
+    let mut rig_side = RigSide::open(&sequence, None, Some(air), Answers::Simulated)?;
     let ports = Ports::new(Box::new(force), Box::new(amplifier), Box::new(stage));
     let mut rig = VirtualLoop::new(setup.config, model, ports);
     let mut passes = Vec::new();
     let outcome =
         supervisor::sweep(&mut rig, &mut sequence, &mut Requests::default, &mut |row, sequence, reaction| {
-            bench.serve(row.now, sequence, &reaction);
+            rig_side.serve(row.now, sequence, &reaction);
             each(row);
             passes.extend(reaction.pass);
         });
     let agreement = sequence.agreement(outcome == Outcome::Complete);
-    Ok(Rehearsal { passes, outcome, agreement, cycles: rig.cycles() })
+    Ok(MemorySweep { passes, outcome, agreement, cycles: rig.cycles() })
 }
 
 /// An outcome as JSON, for the record's last words.
-pub fn words(outcome: &Outcome) -> miette::Result<String> {
+pub fn outcome_json(outcome: &Outcome) -> miette::Result<String> {
     serde_json::to_string(outcome).into_diagnostic()
 }

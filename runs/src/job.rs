@@ -1,15 +1,15 @@
 //! A sweep from its job to its summary. Here in virtual time: in this thread, with the virtual rig's ports.
 //!
-//! The crate `rig` (rig/src/session.rs) runs the same sequence in wall-clock time, with a thread for the loop
-//! and instruments behind drivers. Job, summary and [`Keeper`], which writes the run's folder, serve both.
+//! The crate `rig` (rig/src/wall_run.rs) runs the same sequence in wall-clock time, with a thread for the
+//! loop and instruments behind drivers. Job, summary and [`RunWriter`], which writes the run's folder, serve both.
 
 mod fast;
-pub mod keeper;
 pub mod licence;
+pub mod run_writer;
 mod telemetry;
 
-pub use fast::{Rehearsal, rehearse, words};
-pub use keeper::{Keeper, REPLAYABLE, Replayable, TARGET, is_model, model_name, unix_ns};
+pub use fast::{MemorySweep, outcome_json, sweep_in_memory};
+pub use run_writer::{REPLAYABLE, Replayable, RunWriter, TARGET, is_model, model_name, unix_ns};
 pub use telemetry::{Deadlines, Extremes, LATENESS_BOUNDS_S, Snapshot, Snapshots};
 
 use crate::ambient::{Answers, LevelsFound};
@@ -212,7 +212,7 @@ fn no_claim() -> Agreement {
 pub enum Unfinished {
     /// The sweep ran, and its record could not be saved.
     #[error("the sweep had begun, and its results could not be saved")]
-    NotKept,
+    NotSaved,
     /// A thread hangs or has panicked: a fault of this program.
     #[error("the sweep had begun; the instruments' own watchdogs switch off; what was measured is saved")]
     Internal,
@@ -258,7 +258,7 @@ impl Begun {
 
     /// The summary of a run that is complete: nothing is driven.
     pub fn finish(self, job: &Job) -> miette::Result<Summary> {
-        Keeper::finish(job, self.dir, self.planned, self.sequence.agreement(true))
+        RunWriter::finish(job, self.dir, self.planned, self.sequence.agreement(true))
     }
 }
 
@@ -358,7 +358,7 @@ impl Job {
         let mut dir = RunDir::open(&self.out, &Identity { planned, ..self.identity() })?;
         self.notes = dir.notes().clone();
         let left = dir.left_of(points);
-        let session = dir.plan_session(keeper::unix_ns(), self.plan.file.pass.measure_s, self.fast);
+        let session = dir.plan_session(run_writer::unix_ns(), self.plan.file.pass.measure_s, self.fast);
         let mut sequence = Sequence::new(
             left,
             crate::plan::times(&self.setup.reaches()?, self.plan.file.pass),

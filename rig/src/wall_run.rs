@@ -17,11 +17,11 @@ use realtime::pacing::{self, Lifeline};
 use realtime::ports::Nanos;
 use realtime::stall_monitor::{StallMonitor, StallReport};
 use realtime::turn::Ports;
-use runs::ambient::{Answers, Bench, World};
+use runs::ambient::{Answers, RigSide, World};
 use runs::exposure_left::Left;
+use runs::job::run_writer::{self, RunWriter};
+use runs::job::{Begun, Job, Signals, Snapshot, Snapshots, Summary, Unfinished, Update};
 use runs::sequence::{Event, MeasuredPass, Outcome, Sequence};
-use runs::session::keeper::{self, Keeper};
-use runs::session::{Begun, Job, Signals, Snapshot, Snapshots, Summary, Unfinished, Update};
 use runs::supervisor::{self, End, Requests};
 use sim::wire::SharedPlant;
 use std::panic::AssertUnwindSafe;
@@ -69,11 +69,11 @@ fn over_instruments(
     let epoch = Instant::now();
     let simulated = job.setup.file.virtual_rig.is_some();
     let clock = if simulated { Clock::holdable(epoch) } else { Clock::from(epoch) };
-    let (origin_ns, start_unix_ns) = (pacing::monotonic_ns(), keeper::unix_ns());
-    let (_emulators, bench, rig) = connect(&job, &sequence, answers, &clock)?;
-    let mut keeper = Keeper::begin(&job, dir, planned)?;
-    let file = keeper.new_record()?;
-    let preamble = keeper::preamble(&job, start_unix_ns)?;
+    let (origin_ns, start_unix_ns) = (pacing::monotonic_ns(), run_writer::unix_ns());
+    let (_emulators, rig_side, rig) = connect(&job, &sequence, answers, &clock)?;
+    let mut writer = RunWriter::begin(&job, dir, planned)?;
+    let file = writer.new_record()?;
+    let preamble = run_writer::preamble(&job, start_unix_ns)?;
 
     let lost = Arc::new(AtomicBool::new(false));
     let monitor = StallMonitor::start(origin_ns).into_diagnostic().wrap_err(Unfinished::Internal)?;
@@ -93,9 +93,9 @@ fn over_instruments(
     let recording = Recording::start(file, preamble, rows, &lost, &clock)?;
 
     let (note_in, notes) = channel();
-    let mut unkept = None;
-    let mut keep = |update: &mut dyn FnMut(Update<'_>)| {
-        pass_on(&notes, &mut keeper, &lost, &recording.entries, &mut unkept, update);
+    let mut unsaved = None;
+    let mut save = |update: &mut dyn FnMut(Update<'_>)| {
+        pass_on(&notes, &mut writer, &lost, &recording.entries, &mut unsaved, update);
     };
     let mut snapshots = Snapshots::of(start_unix_ns, job.setup.config.limits.timing.cycle);
     let (life, stop, session) = (rig.life(), handle.stopper(), tracing::Span::current());
@@ -103,16 +103,16 @@ fn over_instruments(
     let (outcome, panicked) = std::thread::scope(|scope| {
         let following = scope.spawn(move || {
             let _session = session.enter();
-            follow(note_in, &life, &mut snapshots, asks, bench, following_sequence, handle)
+            follow(note_in, &life, &mut snapshots, asks, rig_side, following_sequence, handle)
         });
         // The receiver of the updates is foreign code, and may panic where its terminal is gone. Then the rig
         // is stopped before anything else, the measurements are stored, and the panic continues with the rig
         // off.
-        let finished = std::panic::catch_unwind(AssertUnwindSafe(|| keep(update)));
+        let finished = std::panic::catch_unwind(AssertUnwindSafe(|| save(update)));
         if finished.is_err() {
             stop();
             lost.store(true, Ordering::Relaxed);
-            keep(&mut |_| {});
+            save(&mut |_| {});
         }
         (following.join().map_err(|_| fault("the sweep's thread panicked")), finished.err())
     });
@@ -138,10 +138,10 @@ fn over_instruments(
     if let Some(what) = &report.panicked {
         tracing::error!(what, "a port panicked in the loop: the rig was stopped");
     }
-    let outcome = as_recorded(outcome, &written, unkept);
+    let outcome = as_recorded(outcome, &written, unsaved);
     let record_lost = written.lost_rows + report.ring_drops;
     let agreement = sequence.agreement(outcome == Outcome::Complete);
-    Ok(keeper.end(outcome, agreement, Some((report, stalls, held_back)), record_lost, links, off))
+    Ok(writer.end(outcome, agreement, Some((report, stalls, held_back)), record_lost, links, off))
 }
 
 /// What the record ends with, by name, as JSON.
@@ -157,8 +157,8 @@ fn last_words(outcome: &miette::Result<Outcome>, stalls: &StallReport, of: &Ende
 }
 
 /// The outcome, `RecordLost` where the last rows did not reach the file; logs why the record was lost.
-fn as_recorded(outcome: Outcome, written: &Written, unkept: Option<miette::Report>) -> Outcome {
-    for why in written.problem.iter().cloned().chain(unkept.map(|e| format!("{e:#}"))) {
+fn as_recorded(outcome: Outcome, written: &Written, unsaved: Option<miette::Report>) -> Outcome {
+    for why in written.problem.iter().cloned().chain(unsaved.map(|e| format!("{e:#}"))) {
         tracing::error!(why, "the record could not be saved: the sweep was stopped");
     }
     let lost = written.problem.is_some() && outcome == Outcome::Complete;
@@ -166,7 +166,7 @@ fn as_recorded(outcome: Outcome, written: &Written, unkept: Option<miette::Repor
 }
 
 /// A virtual rig's instruments as they are served, what is beside the rig, and its ports.
-type Connected = (Option<(Emulators, SharedPlant)>, Bench, drivers::Rig);
+type Connected = (Option<(Emulators, SharedPlant)>, RigSide, drivers::Rig);
 
 /// Serves the virtual rig where the setup has one, and opens the instruments.
 fn connect(job: &Job, sequence: &Sequence, answers: Answers, clock: &Clock) -> miette::Result<Connected> {
@@ -179,11 +179,11 @@ fn connect(job: &Job, sequence: &Sequence, answers: Answers, clock: &Clock) -> m
         emulators = Some((served.map_err(|problem| miette::miette!("{problem}"))?, plant));
     }
     let air = emulators.as_ref().map(|(_, plant)| World::Served(plant.clone()));
-    let bench = Bench::open(sequence, instruments.chamber.as_ref(), air, answers)?;
+    let rig_side = RigSide::open(sequence, instruments.chamber.as_ref(), air, answers)?;
     let rig = drivers::open(&instruments, clock.clone()).map_err(|e| {
         miette::miette!(help = "check address, wiring and power; 'muprime doctor --setup' says more", "{e}")
     })?;
-    Ok((emulators, bench, rig))
+    Ok((emulators, rig_side, rig))
 }
 
 /// What the sweep has to keep and to tell.
@@ -206,10 +206,10 @@ fn asks(signals: &Signals, lost: &AtomicBool, keeping: Option<&Keeping>) -> impl
             stops = requested;
             return Some(End::Requested);
         }
-        let unkept = keeping.is_some_and(|keeping| !keeping.holds());
+        let unsaved = keeping.is_some_and(|keeping| !keeping.holds());
         let end = match lost.load(Ordering::Relaxed) {
-            true => Some(End::NotKept),
-            false => unkept.then_some(End::ExposureNotKept),
+            true => Some(End::NotSaved),
+            false => unsaved.then_some(End::ExposureNotSaved),
         };
         let end = end.filter(|_| !knows);
         knows |= end.is_some();
@@ -219,18 +219,18 @@ fn asks(signals: &Signals, lost: &AtomicBool, keeping: Option<&Keeping>) -> impl
 }
 
 /// Answers the loop's rows until the sweep ends. The last argument is dropped first: the notes end after loop
-/// and bench.
+/// and the rig's side.
 fn follow(
     notes: Sender<Note>,
     life: &Lifeline,
     snapshots: &mut Snapshots,
     mut asks: impl FnMut() -> Requests,
-    mut bench: Bench,
+    mut rig_side: RigSide,
     sequence: &mut Sequence,
     mut handle: LoopHandle,
 ) -> Outcome {
     supervisor::sweep(&mut handle, sequence, &mut asks, &mut |row, sequence, reaction| {
-        bench.serve(row.now, sequence, &reaction);
+        rig_side.serve(row.now, sequence, &reaction);
         let state = snapshots.take(row).map(|state| Snapshot { driven: Some(life.driven()), ..state });
         if state.is_some() || !reaction.events.is_empty() || reaction.pass.is_some() {
             let (done, all) = sequence.progress();
@@ -242,21 +242,21 @@ fn follow(
     })
 }
 
-/// Passes notes on until the sweep ends: to the disk, to whoever watches, and into the record. `unkept` takes
-/// why the first pass that could not be stored was not.
+/// Passes notes on until the sweep ends: to the disk, to whoever watches, and into the record. `unsaved`
+/// takes why the first pass that could not be stored was not.
 fn pass_on(
     notes: &Receiver<Note>,
-    keeper: &mut Keeper,
+    writer: &mut RunWriter,
     lost: &AtomicBool,
     entries: &Sender<Entry>,
-    unkept: &mut Option<miette::Report>,
+    unsaved: &mut Option<miette::Report>,
     update: &mut dyn FnMut(Update<'_>),
 ) {
     for note in notes {
         // Passes that come until the sweep has stopped are stored if possible.
-        if let Err(why) = keeper.keep(&note.events, note.pass.as_ref(), update) {
+        if let Err(why) = writer.save(&note.events, note.pass.as_ref(), update) {
             lost.store(true, Ordering::Relaxed);
-            unkept.get_or_insert(why);
+            unsaved.get_or_insert(why);
         }
         if note.pass.is_some() {
             let (done, all, left_s) = note.progress;

@@ -7,12 +7,12 @@ use diagnosis::hypotheses::Options;
 use miette::{Context, IntoDiagnostic};
 use models::pass::read_passes;
 use pyo3::prelude::*;
-use runs::verdict::{corrected_model, words};
+use runs::verdict_text::{corrected_model, words};
 use std::path::{Path, PathBuf};
+use tables::diagnose::Subject;
 use tables::joined::{Part, joined, start_of};
 use tables::law::{for_finger, of_text, own_effects};
 use tables::passes::parse_passes;
-use tables::verdict::Subject;
 
 /// A diagnosis: the document of `muprime diagnose --json`, text, page, requested predictions as CSV, and the
 /// corrected model as TOML.

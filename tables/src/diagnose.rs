@@ -6,16 +6,17 @@ use crate::passes::parse_passes;
 use calibration::certificate::sha256_hex;
 use diagnosis::data::{DataError, Table};
 use diagnosis::hypotheses::Options;
-use diagnosis::law::{CannotTell, Law};
+use diagnosis::law::{BaseLaw, CannotTell};
 use diagnosis::verdict::{Diagnosis, diagnose};
 use miette::{IntoDiagnostic, WrapErr};
 use models::pass::Pass;
 use models::rig_file::RigFile;
+use runs::edges::add_record;
 use runs::input::{MAX_TABLE_BYTES, bytes_of, rig_file};
 use runs::report::diagnosis::page;
 use runs::run_data::about;
 use runs::run_dir::{damage_in, is_held, record_facts};
-use runs::verdict::{add_record, files};
+use runs::verdict_text::files;
 use std::path::{Path, PathBuf};
 use std::sync::Arc;
 
@@ -36,7 +37,7 @@ pub struct Subject {
     pub table: Table,
     /// What the rig's calibration states.
     pub rig: RigFile,
-    law: Option<Arc<Law>>,
+    law: Option<Arc<BaseLaw>>,
     sha256: String,
 }
 
@@ -63,9 +64,9 @@ impl Subject {
     /// The same on a base law in place of the spring-slider.
     ///
     /// # Errors
-    /// A law that can tell at too few passes: [`Law::on`].
+    /// A law that can tell at too few passes: [`BaseLaw::on`].
     pub fn on(self, base: Loaded) -> Result<Self, CannotTell> {
-        let (law, table) = Law::on(base.model, base.file.map(|(_, text)| text), &self.table)?;
+        let (law, table) = BaseLaw::on(base.model, base.file.map(|(_, text)| text), &self.table)?;
         Ok(Subject { law: Some(Arc::new(law)), table, ..self })
     }
 

@@ -107,8 +107,8 @@ impl Answers {
     }
 }
 
-/// Whoever serves a sweep at the rig.
-pub struct Bench {
+/// What serves a sweep at the rig: the chamber, and whoever answers its questions.
+pub struct RigSide {
     chamber: Option<Chamber>,
     world: Option<World>,
     answers: Answers,
@@ -119,8 +119,8 @@ pub struct Bench {
     valve_turned: Option<Nanos>,
 }
 
-impl Bench {
-    /// A bench for a sweep on a setup whose chamber is at `chamber`, where it is connected to.
+impl RigSide {
+    /// The rig's side of a sweep on a setup whose chamber is at `chamber`, where it is connected to.
     ///
     /// # Errors
     /// A chamber that does not answer.
@@ -136,7 +136,7 @@ impl Bench {
         })?;
         let source = if world.is_some() { Source::Simulated } else { Source::Instrument };
         let (question, looked, problem, valve_turned) = (None, None, None, None);
-        Ok(Bench { chamber, world, answers, source, question, looked, problem, valve_turned })
+        Ok(RigSide { chamber, world, answers, source, question, looked, problem, valve_turned })
     }
 
     /// Serves what a row led to: set-points out, readings and answers in.

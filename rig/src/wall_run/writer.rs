@@ -9,8 +9,8 @@ use realtime::turn::Row;
 use ringbuf::HeapCons;
 use ringbuf::traits::Consumer;
 use runs::files::Placed;
+use runs::job::run_writer;
 use runs::sequence::{Event, MeasuredPass};
-use runs::session::keeper;
 use std::collections::BTreeMap;
 use std::sync::Arc;
 use std::sync::atomic::{AtomicBool, Ordering};
@@ -129,7 +129,7 @@ fn record(
             idle = false;
         }
         while let Ok((at, events, pass)) = entries.try_recv() {
-            keeper::record(&mut recorder, at, &events, pass.as_ref())?;
+            run_writer::record(&mut recorder, at, &events, pass.as_ref())?;
             idle = false;
         }
         if flushed.elapsed() >= FLUSH_EVERY {

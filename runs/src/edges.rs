@@ -2,15 +2,17 @@
 //! under load.
 
 use crate::input::parse_toml;
+use crate::job::{REPLAYABLE, Replayable};
 use crate::plan::PlanFile;
 use crate::run_dir::{open_record, records_in};
-use crate::session::{REPLAYABLE, Replayable};
 use diagnosis::timing::{Against, Edge, RecordPart, judge};
+use diagnosis::verdict::Diagnosis;
 use miette::IntoDiagnostic;
 use models::condition::Condition;
 use models::finger::Finger;
 use models::prediction::SpringSlider;
 use models::quantity::PeakToPeak;
+use models::rig_file::RigFile;
 use realtime::ports::{Nanos, Quality};
 use realtime::recorder::{self, Entry};
 use realtime::turn::Row;
@@ -128,6 +130,17 @@ fn edge(against: Against, since: Nanos, rows: &[Row]) -> Option<Edge> {
 fn without_edges(plan: &[u8]) -> bool {
     let plan = std::str::from_utf8(plan).ok().and_then(|text| parse_toml::<PlanFile>("plan.toml", text).ok());
     plan.is_some_and(|plan| plan.series.iter().all(|series| series.edges == 0))
+}
+
+/// Adds what a run's record says of time to a verdict on its passes; a folder without a record adds nothing.
+///
+/// # Errors
+/// A record that cannot be opened.
+pub fn add_record(result: &mut Diagnosis, run: &Path, rig: &RigFile) -> miette::Result<()> {
+    if !records_in(run)?.is_empty() {
+        result.add_record(of_run(run, rig.finger)?);
+    }
+    Ok(())
 }
 
 /// Reads and judges the records of a run's folder.
