@@ -56,6 +56,9 @@ fn run(tables: &str, limits: &str, hand: bool) -> (Outcome, usize, usize, Vec<Ev
         notes: Default::default(),
         answers: None,
     };
+    let (_, _, remarks) = job.points_seen(None).unwrap();
+    let too_long = remarks.iter().any(|remark| remark.contains("vibrate the finger for"));
+    assert_eq!(too_long, limits.contains("exposure_max_s"), "{remarks:?}");
     let mut events = Vec::new();
     let mut update = |update: Update<'_>| {
         if let Update::Event(event) = update {

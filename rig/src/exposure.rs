@@ -6,7 +6,8 @@
 //! while the run goes, once a second. It is always ahead of the truth: each entry includes [`AHEAD`] of
 //! driving at the setup's strongest, and the entry of an orderly end takes that back. So a killed program
 //! loses nothing; it is charged too much, by [`AHEAD`] at most. A file has two places that are written in
-//! turn, each with its check sum: a power cut can tear only one.
+//! turn, each with its check sum: a power cut can tear only one. A run locks its files: of two runs that
+//! vibrate one person at a time, each would know of half.
 //!
 //! Time is that of the machine since it was started, in its sleep as well: no wall clock that somebody sets makes an hour short.
 //! After a restart of the machine only the time since then is known to be over, and only that counts as rest.
@@ -16,11 +17,12 @@ use miette::WrapErr;
 use realtime::pacing::Lifeline;
 use realtime::ports::Nanos;
 use realtime::safety::{Exposed, Limits, MINUTE_NS, MINUTES, PART_MINUTES, PARTS};
+use runs::exposure_left::{Left, in_the_last_hour};
 use runs::job::Notes;
 use runs::setup::Setup;
 use serde::{Deserialize, Serialize};
 use std::collections::BTreeMap;
-use std::fs::{File, OpenOptions, Permissions};
+use std::fs::{File, OpenOptions, Permissions, TryLockError};
 use std::io;
 use std::os::unix::fs::{FileExt, MetadataExt, OpenOptionsExt, PermissionsExt};
 use std::path::{Path, PathBuf};
@@ -118,8 +120,8 @@ struct Book {
     file: File,
     path: PathBuf,
     entry: Entry,
-    /// What other users' files hold of the same.
-    others: Vec<Entry>,
+    /// What other users' files hold of the same, with their locks.
+    others: Vec<(File, Entry)>,
 }
 
 /// The ledger of a run: a book for each identity of its amplifier, and one for its person.
@@ -168,6 +170,29 @@ impl Ledger {
         let written = ledger.write_ahead(now_ns);
         written.map_err(|e| miette::miette!(help = help, "the ledger cannot be written: {e}"))?;
         Ok(ledger)
+    }
+
+    /// Refuses a finger whose hour is used up: the rig would never be armed (SR-39, SR-40).
+    ///
+    /// # Errors
+    /// Which book says so, with its numbers and the limits.
+    pub fn has_time_left(&self, limits: &Limits) -> miette::Result<()> {
+        for book in &self.books {
+            let exposed = book.exposed();
+            let (left, (driven, dose)) = (Left::of(limits, &exposed), in_the_last_hour(&exposed));
+            if left.hour_s <= 0.0 || left.dose_m2_s <= 0.0 {
+                miette::bail!(
+                    help = "wait until enough of it is more than an hour ago; the amplifier counts for all subjects",
+                    "no human finger: '{}' was driven for {:.0} s of the last hour with a dose of {dose:.1} m2/s; {:.0} s \
+                     and {:.1} m2/s are allowed",
+                    book.entry.amplifier.trim_start_matches("person/"),
+                    driven,
+                    3600.0 * limits.exposure_duty_max,
+                    limits.exposure_dose_max_m2_s
+                );
+            }
+        }
+        Ok(())
     }
 
     /// What the loop takes over from earlier runs: in each part the worst of all books.
@@ -285,6 +310,14 @@ impl Book {
         let none =
             || Entry { amplifier: of.into(), boot: boot.clone(), until_ns: now_ns, ..Entry::default() };
         let found = |file: &File, path: &Path| {
+            file.try_lock().map_err(|e| match e {
+                TryLockError::WouldBlock => miette::miette!(
+                    help = "wait until that run ends; a name stands for one person, and one person is at one rig",
+                    "'{}' is in another run on this machine",
+                    of.trim_start_matches("person/")
+                ),
+                TryLockError::Error(e) => miette::miette!("{}: {e}", path.display()),
+            })?;
             let entry = newest(file, of).wrap_err_with(|| path.display().to_string())?;
             let mut entry = entry.map_or_else(none, |entry| entry.moved_to(&boot));
             entry.add(0, 0.0, rest, now_ns);
@@ -301,7 +334,8 @@ impl Book {
                 let path = one.path();
                 let file = open_owned(&path, owner, false)
                     .map_err(|e| miette::miette!("{}: {e}", path.display()))?;
-                others.push(found(&file, &path)?);
+                let entry = found(&file, &path)?;
+                others.push((file, entry));
             }
         }
         Ok(Book { file, path, entry, others })
@@ -310,7 +344,7 @@ impl Book {
     /// What all users drove.
     fn exposed(&self) -> Exposed {
         let now_ns = self.entry.until_ns;
-        let others = self.others.iter().map(|entry| entry.exposed(now_ns));
+        let others = self.others.iter().map(|(_, entry)| entry.exposed(now_ns));
         let sum = |sum, other| joined(sum, other, Nanos::plus, |sum, dose| sum + dose);
         others.fold(self.entry.exposed(now_ns), sum)
     }

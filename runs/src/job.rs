@@ -233,9 +233,6 @@ pub struct Signals {
     pub paused: Arc<AtomicBool>,
 }
 
-/// A target, and what the rig will not show of it, in sentences.
-pub type Followed = (Target, Vec<String>);
-
 /// A run whose folder is open and whose passes are ordered.
 pub struct Begun {
     /// The run's folder.
@@ -291,12 +288,15 @@ impl Job {
         Ok(self.points_seen(None)?.0)
     }
 
-    /// The same, with the noise in N that the lateral channel was found to have; and the target of a plan
-    /// that renders one.
+    /// The same, with the noise in N that the lateral channel was found to have; the target of a plan that
+    /// renders one; and remarks.
     ///
     /// # Errors
     /// As [`Job::points`]; a target that cannot be had, or that the rig cannot follow.
-    pub fn points_seen(&self, noise_n: Option<f64>) -> miette::Result<(Vec<Point>, Option<Followed>)> {
+    pub fn points_seen(
+        &self,
+        noise_n: Option<f64>,
+    ) -> miette::Result<(Vec<Point>, Option<Target>, Vec<String>)> {
         let resolution = self.resolution()?;
         let points = self.plan.points(self.seed, &self.setup.config.limits, &resolution)?;
         self.plan.check_ambient(&self.setup)?;
@@ -306,11 +306,13 @@ impl Job {
             let mu0 = self.setup.tip.mu0;
             self.plan.check_visible(&points, &resolution, &*self.model, mu0, &channel)?;
         }
-        let followed = self.followed(&points)?;
-        Ok((points, followed))
+        let (target, remarks) = self.followed(&points)?.unzip();
+        let limits = &self.setup.config.limits;
+        let beyond = crate::exposure_left::beyond(limits, &self.plan.file.pass, &points);
+        Ok((points, target, remarks.into_iter().flatten().chain(beyond).collect()))
     }
 
-    fn followed(&self, points: &[Point]) -> miette::Result<Option<Followed>> {
+    fn followed(&self, points: &[Point]) -> miette::Result<Option<(Target, Vec<String>)>> {
         let (limits, mu0) = (&self.setup.config.limits, self.setup.tip.mu0);
         let known = |frequency_hz| Dynamics::of(&self.setup, frequency_hz);
         let feedback = self.plan.feedback(&known(self.plan.file.base.frequency_hz))?;
@@ -349,8 +351,8 @@ impl Job {
     /// living one.
     pub fn begin(&mut self) -> miette::Result<Begun> {
         self.notes.licence.as_deref().map(licence::address_of).transpose()?;
-        let (points, followed) = self.points_seen(None)?;
-        if let Some((target, _)) = followed {
+        let (points, target, _) = self.points_seen(None)?;
+        if let Some(target) = target {
             self.model = Arc::new(Rendering { law: Arc::clone(&self.model), target });
         }
         let planned = points.len();

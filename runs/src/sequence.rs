@@ -353,8 +353,15 @@ impl Sequence {
             let certificates = self.temperature_ranges.iter().map(|range| range.certificate.clone());
             out.events.extend(certificates.map(|certificate| Event::TemperatureUnwatched { certificate }));
         }
+        self.read_zero(false, out);
+    }
+
+    /// Lifted off and without drive the zeros are read, before the passes or after them.
+    fn read_zero(&mut self, after: bool, out: &mut Reaction) {
+        // A pass that a pause or a person cut short is no part of them.
+        self.sums = Sums::default();
         out.commands.push(Command::Set(Request::default(), self.marker(Phase::Zero)));
-        self.stage = Stage::Zero { since: None, after: false };
+        self.stage = Stage::Zero { since: None, after };
     }
 
     fn zero(&mut self, row: &Row, since: Option<Nanos>, after: bool, out: &mut Reaction) {
@@ -373,7 +380,6 @@ impl Sequence {
             after,
             smallest_load_n: self.points.iter().map(|p| p.condition.normal_force_n).reduce(f64::min),
         });
-        self.sums = Sums::default();
         if after {
             if !self.last_steps(row, out) {
                 out.commands.push(Command::Stop);
@@ -401,10 +407,7 @@ impl Sequence {
 
     fn begin_next(&mut self, row: &Row, out: &mut Reaction) {
         if self.next == self.points.len() {
-            self.sums = Sums::default();
-            out.commands.push(Command::Set(Request::default(), self.marker(Phase::Zero)));
-            self.stage = Stage::Zero { since: None, after: true };
-            return;
+            return self.read_zero(true, out);
         }
         if self.paused {
             out.events.push(Event::Paused { point: self.points[self.next].number });

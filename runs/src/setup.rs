@@ -392,7 +392,9 @@ impl Setup {
     pub fn reaches(&self) -> miette::Result<Vec<Reach>> {
         let instruments = self.instruments();
         let described = |i: &drivers::InstrumentSetup| i.description().map_err(|e| miette::miette!("{e}"));
-        let mut all = Vec::new();
+        let fastest = [0.0, self.config.limits.speed_max_m_s];
+        let by = "`speed_max_m_s` in [limits] allows".to_string();
+        let mut all = vec![Reach { column: "speed_m_s", range: fastest, by }];
         let (amplifier, stage) = (described(&instruments.amplifier)?, described(&instruments.stage)?);
         let gain = instruments.amplifier.amplitude_m_per_unit;
         for (profile, set, column, gain) in [

@@ -210,10 +210,10 @@ fn judge_text(kind: &str, name: &str, on: &On, text: &str) -> miette::Result<(Op
             on.ports.filter(|_| setup.file.virtual_rig.is_none()).map_or(Ok(()), |opens| opens(&setup))?;
             remarks = finger_remarks(&setup.tip.finger, &[("force_sd_n", setup.file.noise.force_sd_n)]);
         }
-        "plan" => return Ok((plan_on(on, Plan::parse(name, text)?)?, remarks)),
+        "plan" => return plan_on(on, Plan::parse(name, text)?),
         "campaign" => {
             let campaign = runs::campaign::Campaign::parse(name, text, folder)?;
-            let passes = |setup| preflight(setup, campaign.plan.clone(), on.model.as_ref(), None);
+            let passes = |setup| Ok(preflight(setup, campaign.plan.clone(), on.model.as_ref(), None)?.0);
             let passes: usize = campaign.setups.iter().map(passes).sum::<miette::Result<_>>()?;
             return Ok((Some(passes * campaign.file.blocks as usize), remarks));
         }

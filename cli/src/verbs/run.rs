@@ -112,9 +112,9 @@ pub fn run(mut args: Args, json: bool) -> miette::Result<ExitCode> {
     let (out, _made) = folder(args.out.clone(), &plan.file.name)?;
     let job = job_of(&args, setup, plan, seed, out)?;
     // An address that is taken is a refusal: nothing was touched yet.
-    let (points, followed) = job.points_seen(None)?;
+    let (points, _, remarks) = job.points_seen(None)?;
     let mu0 = job.setup.tip.mu0;
-    followed.iter().flat_map(|(_, remarks)| remarks).for_each(|remark| report!("{remark}"));
+    remarks.iter().for_each(|remark| report!("{remark}"));
     let untold = |c: &Condition| job.model.predict(&Condition { mu0, ..*c }).is_err();
     match points.iter().filter(|p| untold(&p.condition)).count() {
         0 => {}

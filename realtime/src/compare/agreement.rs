@@ -94,8 +94,8 @@ impl std::fmt::Display for Agreement {
             Agreement::Departed => write!(f, "the measurement disagrees with the model"),
             Agreement::Agrees { judged, rms_z, visible_departure } => write!(
                 f,
-                "agrees with the model ({judged} passes, residuals of {rms_z:.2} standard deviations rms); a deviation of mu' \
-                 above {visible_departure:.3} would have been detected"
+                "agrees with the model ({judged} passes, residuals of {rms_z:.2} standard deviations rms); a constant \
+                 deviation of mu' above {visible_departure:.3} would have been detected"
             ),
             Agreement::TooLittle { why, judged, visible_departure } => {
                 write!(f, "cannot tell whether measurement and model agree: ")?;
@@ -105,7 +105,10 @@ impl std::fmt::Display for Agreement {
                     }
                     Lack::Power => {
                         let visible = visible_departure.unwrap_or(f64::INFINITY);
-                        write!(f, "only a deviation of mu' above {visible:.2} would have been detected")
+                        write!(
+                            f,
+                            "only a constant deviation of mu' above {visible:.2} would have been detected"
+                        )
                     }
                     Lack::Scatter => write!(f, "the residuals scatter more than the stated noise"),
                     Lack::Unfinished => {

@@ -52,7 +52,7 @@ causes! {
     /// The dead-man input was released in human-contact mode.
     DeadMan "the dead-man device was released" => "Release the dead-man device, grip it again, and start the run again.";
     /// Vibration on a human finger lasted too long.
-    Exposure "vibration on the finger lasted too long without a rest" => "Take the finger off and rest as long as `exposure_rest_s` says; plan shorter passes.";
+    Exposure "vibration on the finger lasted too long without a rest" => "Take the finger off and rest as long as `exposure_rest_s` says; the same command with the same --out then resumes the run.";
     NormalOverforce "the normal force is beyond its limit" => "Lift the finger off and check load, stage and sensor before it is loaded again.";
     LateralOverforce "the lateral force is beyond its limit" => "Look for what holds the finger or the plate; ask for a smaller load.";
     ForceRate "the normal force changes too fast" => "Look for a blow or a loose sensor; load more slowly.";

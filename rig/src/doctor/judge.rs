@@ -375,7 +375,7 @@ fn planned(inspected: &Inspection, setup: &Setup, plan: &Plan, mended: bool) -> 
     };
     let noise = channel("lateral").and_then(|c| c.noise_sd);
     let passes = match tables::check::preflight(setup, plan.clone(), None, noise) {
-        Ok(passes) => passes,
+        Ok((passes, _)) => passes,
         Err(why) => {
             let advice = why.help().map_or("change plan or setup".into(), |h| h.to_string());
             return Finding::new(subject, false, format!("{why}"), advice);

@@ -1,5 +1,4 @@
 use super::*;
-use runs::exposure_left::Left;
 
 /// A folder as `/var/tmp` is, gone with the test.
 struct Folder(PathBuf);
@@ -107,6 +106,31 @@ fn every_identity_counts_and_the_worst_holds() {
     assert_eq!((left.hour_s, left.dose_m2_s, left.in_one_go_s), (750.0, 21.5, 0.0));
 }
 
+/// Two runs that vibrate one person at a time would each know of half of it.
+#[test]
+fn one_person_is_in_one_run_at_a_time() {
+    let folder = Folder::new("two");
+    let first = folder.of(&["tcp/a", "person/x"]).unwrap();
+    let refused = format!("{:?}", folder.of(&["tcp/b", "person/x"]).err());
+    assert!(refused.contains("'x' is in another run on this machine"), "{refused}");
+    folder.of(&["tcp/b", "person/y"]).unwrap();
+    drop(first);
+    folder.of(&["tcp/b", "person/x"]).unwrap();
+}
+
+/// An hour that is used up is refused before anybody waits at the rig, with the book that says so.
+#[test]
+fn an_hour_that_is_used_up_is_refused_with_its_numbers() {
+    let folder = Folder::new("hour");
+    driven(folder.of(&["tcp/a", "person/x"]).unwrap(), 900, 2.5).end(true);
+    let ledger = folder.of(&["tcp/a", "person/y"]).unwrap();
+    let refused = format!("{:?}", ledger.has_time_left(&limits()).err());
+    assert!(refused.contains("'tcp/a' was driven for 900 s of the last hour"), "{refused}");
+    assert!(refused.contains("900 s and 25.0 m2/s are allowed"), "{refused}");
+    drop(ledger);
+    folder.of(&["tcp/b", "person/y"]).unwrap().has_time_left(&limits()).unwrap();
+}
+
 /// What others may write, or what is another's under this user's name, is not a ledger; what other users
 /// drove is added.
 #[test]
@@ -138,8 +162,12 @@ fn nobody_else_can_write_a_ledger_and_what_others_drove_counts() {
 #[test]
 fn a_killed_run_is_charged_too_much_and_never_too_little() {
     let folder = Folder::new("killed");
-    std::mem::forget(driven(folder.open().unwrap(), 100, 2.5));
-    let (time, dose) = last_hour(&folder.open().unwrap());
+    // What a killed program leaves behind: its files, without their locks.
+    let left = Folder::new("left");
+    let running = driven(folder.open().unwrap(), 100, 2.5);
+    std::fs::copy(folder.file(), left.0.join(folder.file().file_name().unwrap())).unwrap();
+    running.end(true);
+    let (time, dose) = last_hour(&left.open().unwrap());
     assert_eq!(time, 100 * SECOND + AHEAD_NS);
     assert!(dose > 2.5, "{dose}");
     // Neither is one whose drive was not read back off.

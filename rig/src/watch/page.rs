@@ -183,7 +183,8 @@ fn state(page: &Page<'_>) -> (String, Style) {
         return (words, look.alarm());
     }
     if view.paused {
-        return ("PAUSED: no drive, lifted off, armed; r goes on".into(), look.strong(Color::Yellow));
+        let armed = if s.armed { "still armed" } else { "not armed" };
+        return (format!("PAUSED: no drive, lifted off, {armed}; r goes on"), look.strong(Color::Yellow));
     }
     let point = if s.point == u32::MAX { "none".into() } else { s.point.to_string() };
     let at = format!("{}, point {point}", phase(s.phase));

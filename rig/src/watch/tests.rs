@@ -253,7 +253,7 @@ fn trips_ends_and_rests_are_told_with_what_to_do() {
         for (name, view) in states() {
             let page = text(&shown(&view, size, PLAIN));
             match name {
-                "paused" => has(&page, &["PAUSED", "r goes on", "left from when it goes on"]),
+                "paused" => has(&page, &["PAUSED", "still armed; r goes on", "left from when it goes on"]),
                 "tripped" => {
                     has(&page, &["TRIPPED", "STOPPED for safety: the normal force", "2 N", "remedy: "])
                 }

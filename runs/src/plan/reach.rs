@@ -6,7 +6,7 @@ use crate::human::quantity;
 use crate::input::{Problems, place_of};
 use models::covariate::Covariate;
 
-/// The values of one setting that an instrument takes or sees.
+/// The values of one setting that an instrument takes or sees, or that a limit allows.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Reach {
     /// Column of the setting.
@@ -40,7 +40,7 @@ impl Plan {
                 taken.by,
                 quantity(taken.range[1], "m/s")
             );
-            let remedy = "leave the key out, or change the `range` of the set-point in a profile of your own";
+            let remedy = "leave the key out: the travel is then as fast as stage and limits allow";
             wrong.add_at(Some(place), problem, remedy.to_string());
         }
         wrong.end()
@@ -50,11 +50,13 @@ impl Plan {
 /// Relative rounding of a range that is counted in the instrument's units.
 const ROUNDING: f64 = 1e-9;
 
+/// What allows the smallest speed.
 fn of_speed(reaches: &[Reach]) -> Option<&Reach> {
-    reaches.iter().find(|reach| reach.column == "speed_m_s")
+    let all = reaches.iter().filter(|reach| reach.column == "speed_m_s");
+    all.min_by(|a, b| a.range[1].total_cmp(&b.range[1]))
 }
 
-/// The times of a pass with a travel to its start that is no faster than the stage. A speed that the plan
+/// The times of a pass with a travel to its start that is no faster than stage and limits. A speed that the plan
 /// states was refused where it is ([`Plan::check_reach`]).
 pub fn times(reaches: &[Reach], times: PassTimes) -> PassTimes {
     let most = of_speed(reaches).map_or(f64::INFINITY, |taken| taken.range[1]);
@@ -92,6 +94,10 @@ mod tests {
         plan.check_reach(&reach).unwrap();
         assert!(plan.file.pass.approach_speed_m_s > 0.1);
         assert_eq!(times(&reach, plan.file.pass).approach_speed_m_s, 0.1);
+        let mut limits = crate::setup::Setup::load("virtual-ideal").unwrap();
+        limits.config.limits.speed_max_m_s = 0.08;
+        let both = [&reach[..], &limits.reaches().unwrap()].concat();
+        assert_eq!(times(&both, plan.file.pass).approach_speed_m_s, 0.08);
         for (from, to) in [
             ("speed_m_s = 0.02", "speed_m_s = 0.12"),
             ("settle_s = 0.05", "settle_s = 0.05\napproach_speed_m_s = 0.15"),

@@ -12,20 +12,20 @@ use runs::setup::Setup;
 use std::path::PathBuf;
 use std::sync::Arc;
 
-/// The passes of a plan on its setup; none where it is judged by itself.
-pub(super) fn plan_on(on: &On, plan: Plan) -> miette::Result<Option<usize>> {
+/// The passes of a plan on its setup, none where it is judged by itself; and remarks.
+pub(super) fn plan_on(on: &On, plan: Plan) -> miette::Result<(Option<usize>, Vec<String>)> {
     let Some(setup) = &on.setup else {
         let fine = Resolution { amplitude_pp_m: 0.0, frequency_hz: 0.0 };
         plan.points(plan.file.seed, &widest(), &fine)?;
         // The file of a target; how large a lateral force may be, the fingertip of a setup says.
         plan.target(1e6, None)?;
-        return Ok(None);
+        return Ok((None, Vec::new()));
     };
     complete(setup)?;
-    let passes = preflight(setup, plan, on.model.as_ref(), None);
+    let judged = preflight(setup, plan, on.model.as_ref(), None);
     let ports = on.ports.map_or(Ok(()), |opens| opens(setup));
-    match (passes, ports) {
-        (Ok(passes), Ok(())) => Ok(Some(passes)),
+    match (judged, ports) {
+        (Ok((passes, remarks)), Ok(())) => Ok((Some(passes), remarks)),
         (Err(why), Ok(())) | (Ok(_), Err(why)) => Err(why),
         (Err(why), Err(closed)) => {
             let help = [&why, &closed].into_iter().flat_map(problems_of).filter_map(|p| p.help);
@@ -58,7 +58,7 @@ pub(super) fn complete(setup: &Setup) -> miette::Result<()> {
 }
 
 /// Everything that a run looks at in a plan before it touches rig or folder; the lateral channel's noise in
-/// N, where it was found. Returns the number of passes.
+/// N, where it was found. Returns the number of passes, and remarks.
 ///
 /// # Errors
 /// What the run would refuse.
@@ -67,7 +67,7 @@ pub fn preflight(
     plan: Plan,
     model: Option<&Arc<dyn FrictionModel>>,
     noise_n: Option<f64>,
-) -> miette::Result<usize> {
+) -> miette::Result<(usize, Vec<String>)> {
     let model = match model {
         Some(model) => Arc::clone(model),
         None => Arc::new(SpringSlider::new(setup.tip.finger).into_diagnostic()?),
@@ -84,7 +84,8 @@ pub fn preflight(
         notes: Default::default(),
         answers: None,
     };
-    Ok(job.points_seen(noise_n)?.0.len())
+    let (points, _, remarks) = job.points_seen(noise_n)?;
+    Ok((points.len(), remarks))
 }
 
 /// The limits of a rig that has the hard ones only.
