@@ -211,3 +211,14 @@ fn the_worked_example_prints_what_its_page_says() {
         }
     }
 }
+
+/// A Gauss-Newton step that went too far ended the search for the end of an interval: it was 0.375 to 0.794
+/// about 0.378. A profile outside this project reaches a chi2 of 3.4 at 0.20.
+#[test]
+fn an_interval_does_not_end_where_a_step_goes_too_far() {
+    let report = verdict_of("slider-crosstalk-drift/points.csv");
+    let leader = &report.hypotheses[0];
+    assert!(leader.effects.iter().any(|effect| effect == "force_crosstalk"), "{:?}", leader.effects);
+    let change = leader.parameters.iter().find(|p| p.name == "relative_change").expect("a relative change");
+    assert!(change.ci95[0] < 0.25 && change.ci95[0] > 0.1, "{:?}", change.ci95);
+}

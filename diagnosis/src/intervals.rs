@@ -177,8 +177,17 @@ impl Profiles<'_> {
             (0..u.len()).filter(|i| precision[*i] == 0.0).for_each(|i| hessian[(i, i)] += 1e-9);
             let Some(mut next) = bounded_step(&hessian, &gradient, 1e-6, &u, &bounds) else { break };
             next[k] = value_at;
-            let there = problem.predict(&best.members, &next);
-            let v = self.cost(&next, &there);
+            let mut there = problem.predict(&best.members, &next);
+            let mut v = self.cost(&next, &there);
+            // A step that goes too far is no end of the way: an interval that stops there is too narrow.
+            for _ in 0..3 {
+                if v < value {
+                    break;
+                }
+                next.iter_mut().zip(&u).for_each(|(next, u)| *next = 0.5 * (*next + u));
+                there = problem.predict(&best.members, &next);
+                v = self.cost(&next, &there);
+            }
             if v >= value - 1e-3 {
                 if v < value {
                     (u, value) = (next, v);

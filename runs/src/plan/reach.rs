@@ -56,8 +56,8 @@ fn of_speed(reaches: &[Reach]) -> Option<&Reach> {
     all.min_by(|a, b| a.range[1].total_cmp(&b.range[1]))
 }
 
-/// The times of a pass with a travel to its start that is no faster than stage and limits. A speed that the plan
-/// states was refused where it is ([`Plan::check_reach`]).
+/// The times of a pass with a travel to its start that is no faster than stage and limits. A speed that the
+/// plan states was refused where it is ([`Plan::check_reach`]).
 pub fn times(reaches: &[Reach], times: PassTimes) -> PassTimes {
     let most = of_speed(reaches).map_or(f64::INFINITY, |taken| taken.range[1]);
     PassTimes { approach_speed_m_s: times.approach_speed_m_s.min(most), ..times }

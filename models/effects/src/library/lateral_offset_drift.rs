@@ -45,7 +45,7 @@ pub(super) static EFFECT: Effect = Effect {
             ],
         )
         .needs(&[Need::Vibration, Need::Amplitudes])
-        .seen_by(CHECK, 0.0005),
+        .seen_by("Lift the finger, switch the drive on and off; read the lateral force.", 0.0005),
     ],
     acts: Some(Acts { on: Input::Offset, over: &[&covariate::TIME] }),
     needs: &[Need::Directions],

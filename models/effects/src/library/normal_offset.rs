@@ -34,7 +34,7 @@ pub(super) static EFFECT: Effect = Effect {
             ],
         )
         .needs(&[Need::Vibration])
-        .seen_by(CHECK, 0.001),
+        .seen_by("Lift the finger, switch the drive on and off; read the normal force.", 0.001),
     ],
     acts: Some(Acts { on: Input::Load, over: &[&covariate::TIME] }),
     needs: &[Need::Loads],

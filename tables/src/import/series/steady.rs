@@ -2,29 +2,36 @@
 
 use super::path::{pieces, sums};
 use crate::import::targets::Id;
-use crate::import::values::{Values, mean as average, sorted};
+use crate::import::values::{Values, mean as average, middle, sorted};
 use models::pass::Pass;
 
 /// Relative change over the window about a sample from which it is not steady.
 const STEADY: f64 = 0.1;
+/// Deviations of noise that two means of one load may lie apart: a leg has thousands of such pairs.
+const BY_NOISE: f64 = 4.0;
 
 /// Stretches of a leg in which velocity, load and vibration are steady.
 pub fn steady(samples: &[Values], slopes: &[f64], h: usize, from: usize, still: f64) -> Vec<(usize, usize)> {
     let to = from + slopes.len();
     let n = slopes.len();
-    let smooth = |id: Id| -> Vec<f64> {
+    // Means over the window, and how far two of them lie apart by the noise of the samples alone.
+    let smooth = |id: Id| -> (Vec<f64>, f64) {
+        let values: Vec<f64> = samples[from..to].iter().map(|s| s.get(id).unwrap_or(0.0)).collect();
+        let steps = sorted(values.windows(2).map(|w| (w[1] - w[0]).abs()));
+        // The median step of white noise is 0.954 of its deviation.
+        let noise = middle(&steps).unwrap_or(0.0) / 0.954 * (2.0 / (2 * h + 1) as f64).sqrt();
         // A mean over any window is a difference of two sums from the leg's start.
-        let sums = sums(samples[from..to].iter().map(|s| s.get(id).unwrap_or(0.0)));
+        let sums = sums(values.into_iter());
         let window = |k: usize| (k.saturating_sub(h), (k + h + 1).min(n));
-        (0..n).map(window).map(|(a, b)| (sums[b] - sums[a]) / (b - a) as f64).collect()
+        ((0..n).map(window).map(|(a, b)| (sums[b] - sums[a]) / (b - a) as f64).collect(), BY_NOISE * noise)
     };
     let known = |id: &Id| samples[from..to].iter().any(|s| s.get(*id).is_some());
     let vibration = [Id::AmplitudePp, Id::AmplitudePeak, Id::AmplitudeRms, Id::Frequency];
-    let mut tracks: Vec<Vec<f64>> = vec![smooth(Id::NormalForce)];
+    let mut tracks: Vec<(Vec<f64>, f64)> = vec![smooth(Id::NormalForce)];
     tracks.extend(vibration.into_iter().filter(known).map(smooth));
     let is_steady = |k: usize| {
         let (a, b) = (k.saturating_sub(h), (k + h).min(n - 1));
-        let same = |v: &Vec<f64>| (v[b] - v[a]).abs() <= STEADY * v[k].abs();
+        let same = |(v, noise): &(Vec<f64>, f64)| (v[b] - v[a]).abs() <= STEADY * v[k].abs() + noise;
         // The slope is smooth over the window: five places see a rest between its ends.
         let places = sorted((0..5).map(|j| slopes[a + j * (b - a) / 4]));
         let moves = slopes[k].abs() > still && places[4] - places[0] <= STEADY * slopes[k].abs();

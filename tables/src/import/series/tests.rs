@@ -110,6 +110,26 @@ fn moves_with_rests_between_are_passes_of_moving_alone() {
     assert_eq!(imported(&text, "", "amplitude_pp=0", true).unwrap().log.passes, 12);
 }
 
+/// A load that is constant, in noise of 12 and 25 % of a sample: the noise is no change of the load.
+#[test]
+fn noise_of_the_samples_cuts_no_stroke() {
+    for share in [0.12, 0.25] {
+        let mut state = 7u64;
+        // A sum of twelve uniform numbers is nearly normal.
+        let mut normal = || {
+            let one = |_| {
+                state = state.wrapping_mul(6_364_136_223_846_793_005).wrapping_add(1_442_695_040_888_963_407);
+                (state >> 40) as f64 / (1u64 << 24) as f64
+            };
+            (0..12).map(one).sum::<f64>() - 6.0
+        };
+        let noise: Vec<f64> = (0..1600).map(|_| 0.5 * (1.0 + share * normal())).collect();
+        let noisy = |k: usize, c: usize, text: String| if c == 2 { format!("{:.4}", noise[k]) } else { text };
+        let made = imported(&strokes(|x, _| x, noisy), "", "amplitude_pp=0", true).unwrap();
+        assert_eq!(made.log.passes, 8, "{share}: {}", made.table);
+    }
+}
+
 #[test]
 fn a_bad_sample_is_left_out_or_remarked_on() {
     let with = |column: usize, bad: &'static str| {
