@@ -303,6 +303,13 @@ impl Certificate {
         self.parameters.iter().find(|p| p.name == name)
     }
 
+    /// How much warmer than the reference temperature it is, in K; zero where either is unknown.
+    pub fn kelvin(&self, temperature_c: Option<f64>) -> f64 {
+        let reference: Option<f64> =
+            self.settings.get("reference_temperature_c").and_then(|t| t.parse().ok());
+        temperature_c.zip(reference).map_or(0.0, |(t, reference)| t - reference)
+    }
+
     /// Covariance of the parameters, in their order.
     pub fn covariance_matrix(&self) -> DMatrix<f64> {
         let n = self.parameters.len();

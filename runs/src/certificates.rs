@@ -72,7 +72,8 @@ impl Certificates {
                      bench"
                 )));
             }
-            calibration::prior::take(&mut all.calibration, verified).map_err(|e| fail(e.to_string()))?;
+            calibration::prior::take(&mut all.calibration, verified, file.temperature_c)
+                .map_err(|e| fail(e.to_string()))?;
             if kind == CertificateKind::Force {
                 let axes = file.force.iter().flat_map(|i| [&i.lateral, &i.normal]).flatten();
                 if axes.into_iter().any(|a| a.gain != 1.0 || a.offset_n != 0.0) {
@@ -85,7 +86,7 @@ impl Certificates {
                     .map_err(|e| fail(e.to_string()))?;
                 // The setup's zero, or the one that was found with the certificate: both are written down.
                 let none = Zero { counts: [0.0; 2], standard_uncertainty: [0.0; 2], time_s: 0.0 };
-                let found = Zero::of_certificate(&certificate).unwrap_or(none);
+                let found = Zero::of_certificate(&certificate, file.temperature_c).unwrap_or(none);
                 let zero = Zero { counts: file.zero_counts.unwrap_or(found.counts), ..found };
                 all.force = Some((calibration, zero));
                 if file.zero_counts.is_some() {

@@ -62,7 +62,7 @@ impl ForceFit {
         Outcome {
             kind: CertificateKind::Force,
             model: "counts_i = offset_i + sum_j (gain_ij F_j + square_ij F_j^2) + drift_i (t - mean t) \
-                    + hysteresis_ij b 4 s (1 - s) + temperature"
+                    + hysteresis_ij b 4 s (1 - |s|) + temperature"
                 .into(),
             settings: BTreeMap::from([
                 ("tare".into(), "explicit".into()),
@@ -138,9 +138,7 @@ impl ForceCalibration {
             certificate.parameters.iter().position(|p| p.name == name)
         };
         let value = |channel, term| find(channel, term).map(|i| certificate.parameters[i].value);
-        let reference: Option<f64> =
-            certificate.settings.get("reference_temperature_c").and_then(|t| t.parse().ok());
-        let kelvin = temperature_c.zip(reference).map_or(0.0, |(t, reference)| t - reference);
+        let kelvin = certificate.kelvin(temperature_c);
         let mut gain = Matrix2::zeros();
         let mut square = Matrix2::zeros();
         let mut at = [0; 4];

@@ -264,8 +264,9 @@ impl Design {
             Term::Square(axis) => load(axis).powi(2),
             Term::Drift => r.time_s - self.mean_time_s,
             Term::Hysteresis(axis) => {
-                let x = load(axis).abs() / self.largest_n[axis as usize];
-                r.branch.map_or(0.0, |b| b.sign() * 4.0 * x * (1.0 - x))
+                // A lag opposes the change of the load: under a pull to the other side it turns its sign.
+                let x = load(axis) / self.largest_n[axis as usize];
+                r.branch.map_or(0.0, |b| b.sign() * 4.0 * x * (1.0 - x.abs()))
             }
             Term::ZeroTemperature => kelvin(),
             Term::GainTemperature(axis) => load(axis) * kelvin(),
@@ -293,4 +294,61 @@ fn type_b(fit: &ForceFit, weighing: &Weighing) -> DMatrix<f64> {
         covariance += &turned * turned.transpose() * weighing.alignment_sd_rad[axis as usize].powi(2);
     }
     covariance
+}
+
+#[cfg(test)]
+pub(super) mod tests {
+    use super::super::series::Branch;
+    use super::*;
+
+    /// Weights up and down on both axes, laterally both ways, with a lag of `lag` counts and a zero that moves
+    /// by 3 counts/K on the lateral and -2 counts/K on the normal channel.
+    pub(crate) fn series(lag: f64) -> Vec<LoadReading> {
+        let largest = 2.0;
+        let up = [0.2, 0.5, 1.0, 1.5, 2.0].map(|load| (load, Branch::Up));
+        let down = [1.5, 1.0, 0.5, 0.2].map(|load| (load, Branch::Down));
+        let zero = (None, 1.0, 0.0, None);
+        let mut order = vec![zero];
+        for _ in 0..3 {
+            for (axis, side) in [(Axis::Lateral, 1.0), (Axis::Lateral, -1.0), (Axis::Normal, 1.0)] {
+                let loads = up.iter().chain(&down);
+                order.extend(loads.map(|(load, branch)| (Some(axis), side, *load, Some(*branch))));
+                order.push(zero);
+            }
+        }
+        let read = |(i, (axis, side, load, branch)): (usize, (Option<Axis>, f64, f64, Option<Branch>))| {
+            let x = load / largest;
+            let lagging = branch.map_or(0.0, |b: Branch| -b.sign() * lag * 4.0 * x * (1.0 - x) * side);
+            let on = |a: Axis| if axis == Some(a) { side * load } else { 0.0 };
+            let moved = |a: Axis| if axis == Some(a) { lagging } else { 0.0 };
+            let kelvin = [-2.0, 1.0, 2.0, -1.0, 0.0, 1.5, -1.5][i % 7];
+            let noise = [1.0, -1.0, 0.5, -0.5, -1.0, 1.0, 0.0, 0.5, -0.5, 0.2, -0.2][i % 11];
+            let lateral =
+                118.0 + 8_000.0 * on(Axis::Lateral) + 90.0 * on(Axis::Normal) + moved(Axis::Lateral);
+            let normal =
+                3_300.0 - 120.0 * on(Axis::Lateral) + 8_100.0 * on(Axis::Normal) + moved(Axis::Normal);
+            LoadReading {
+                time_s: 20.0 * i as f64,
+                axis,
+                load_n: side * load,
+                counts: [lateral + 3.0 * kelvin + noise, normal - 2.0 * kelvin - noise],
+                branch,
+                temperature_c: Some(22.0 + kelvin),
+                saturated: false,
+            }
+        };
+        order.into_iter().enumerate().map(read).collect()
+    }
+
+    #[test]
+    fn a_lag_under_lateral_weights_both_ways_is_found() {
+        for lag in [2.0, 8.0] {
+            let found = fit(&series(lag), &Weighing::default(), &Options::default()).unwrap();
+            for axis in AXES {
+                let k = found.index(axis, Term::Hysteresis(axis)).unwrap();
+                let (value, sd) = (found.estimates[k], found.type_a[(k, k)].sqrt());
+                assert!((value + lag).abs() < 3.0 * sd && sd < 0.5, "{axis}: {value} +- {sd}, not -{lag}");
+            }
+        }
+    }
 }

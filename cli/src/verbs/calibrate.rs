@@ -69,7 +69,7 @@ fn priors(args: &PriorsArgs, json: bool) -> miette::Result<ExitCode> {
             false => miette::miette!("{name}: {e}"),
         })?;
         let verified = verify(&name, &certificate, certificate.kind, &certificate.instrument.serial)?;
-        calibration::prior::take(&mut priors, verified)
+        calibration::prior::take(&mut priors, verified, None)
             .map_err(|refusal| miette::miette!("{name}: {refusal}"))?;
     }
     if priors == Default::default() {
