@@ -81,6 +81,9 @@ pub enum FitError {
         "the model describes the values no better than a constant (F = {ratio:.1}, above 10 is needed): they are noise"
     )]
     Constant { ratio: f64 },
+    /// The converter or the amplifier was at its end.
+    #[error("the values are clipped at {end}, where they stay: take a larger range or a smaller force")]
+    Clipped { end: f64 },
     /// The iteration of a non-linear fit did not settle.
     #[error("the fit did not converge in {iterations} iterations")]
     NotConverged { iterations: usize },

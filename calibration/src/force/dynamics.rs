@@ -1,7 +1,7 @@
 //! Dynamics of a force channel: bandwidth and delay from a step, resonance of the mount from a tap.
 
 use crate::regression::nonlinear::best;
-use crate::regression::{Fit, FitError};
+use crate::regression::{Fit, FitError, ends};
 use std::f64::consts::PI;
 
 /// A value with its standard uncertainty.
@@ -24,10 +24,20 @@ pub struct StepResponse {
     pub residual: [f64; 2],
 }
 
+/// Refuses a record that stays at an extreme for four samples or more. Where other values repeat too, the
+/// converter is coarser than the noise and nothing is known. A decay may be clipped at `both` ends.
+fn refuse_clipped(samples: &[f64], both: bool) -> Result<(), FitError> {
+    let extremes = ends(samples.iter().copied());
+    let runs = samples.chunk_by(|a, b| a == b).filter(|run| run.len() >= 4);
+    let repeated: Vec<f64> = runs.map(|run| run[0]).collect();
+    let clipped = repeated.iter().all(|x| extremes.contains(x) && (both || *x == repeated[0]));
+    repeated.first().filter(|_| clipped).map_or(Ok(()), |end| Err(FitError::Clipped { end: *end }))
+}
+
 /// Fits a second-order low-pass with dead time to samples around one step at `step_at_s`.
 ///
 /// # Errors
-/// Too few samples, no step in them, or no convergence.
+/// Too few or clipped samples, no step in them, or no convergence.
 pub fn step_response(time_s: &[f64], samples: &[f64], step_at_s: f64) -> Result<StepResponse, FitError> {
     let before: Vec<f64> =
         time_s.iter().zip(samples).filter(|(t, _)| **t < step_at_s).map(|(_, x)| *x).collect();
@@ -35,6 +45,7 @@ pub fn step_response(time_s: &[f64], samples: &[f64], step_at_s: f64) -> Result<
     if before.len() < 5 || tail.len() < 5 {
         return Err(FitError::TooFew { observations: samples.len(), parameters: 5 });
     }
+    refuse_clipped(samples, false)?;
     let mean = |x: &[f64]| x.iter().sum::<f64>() / x.len() as f64;
     let (low, high) = (mean(&before), mean(tail));
     // Half way up: the first guess of delay and speed.
@@ -121,12 +132,13 @@ pub struct RingDown {
 /// Fits `x = c + exp(-zeta omega t) (p cos + q sin)` to a free decay.
 ///
 /// # Errors
-/// Too few samples, nothing that rings, or no convergence.
+/// Too few or clipped samples, nothing that rings, or no convergence.
 pub fn ring_down(time_s: &[f64], samples: &[f64]) -> Result<RingDown, FitError> {
     let n = samples.len();
     if n < 16 {
         return Err(FitError::TooFew { observations: n, parameters: 5 });
     }
+    refuse_clipped(samples, true)?;
     let rate = (n - 1) as f64 / (time_s[n - 1] - time_s[0]);
     // The largest line of a coarse spectrum is where to start.
     let length = n.min(1024);
