@@ -164,6 +164,9 @@ pub struct EqualSamples {
     pub upper: f64,
     /// Longest run of equal samples that was seen.
     pub longest_run: usize,
+    /// Where that run begins (counted from 0) if noise of this level has it less than once in a million records.
+    /// No value is likelier than the root of the share of equal pairs, wherever the mean lies.
+    pub frozen_from: Option<usize>,
 }
 
 impl EqualSamples {
@@ -174,11 +177,14 @@ impl EqualSamples {
         }
         let pairs = (counts.len() - 1) as f64;
         let equal = counts.windows(2).filter(|w| w[0] == w[1]).count() as f64;
-        let longest_run = counts.chunk_by(|a, b| a == b).map(<[i64]>::len).max().unwrap_or(1);
+        let run = counts.chunk_by(|a, b| a == b).max_by_key(|run| run.len()).unwrap_or(counts);
         let (p, z) = (equal / pairs, 3.0902);
         let centre = p + z * z / (2.0 * pairs);
         let half = z * (p * (1.0 - p) / pairs + z * z / (4.0 * pairs * pairs)).sqrt();
-        Some(EqualSamples { share: p, upper: (centre + half) / (1.0 + z * z / pairs), longest_run })
+        let upper = (centre + half) / (1.0 + z * z / pairs);
+        let frozen = counts.len() as f64 * upper.powf(0.5 * run.len() as f64) < 1e-6;
+        let frozen_from = counts.windows(run.len()).position(|w| w == run).filter(|_| frozen);
+        Some(EqualSamples { share: p, upper, longest_run: run.len(), frozen_from })
     }
 
     /// Number of equal samples in a row after which a channel counts as frozen, such that a live one is

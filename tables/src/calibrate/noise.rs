@@ -75,6 +75,13 @@ pub fn outcome_of(args: &Args, sources: &mut Sources) -> miette::Result<Outcome>
                 args.segment
             )
         };
+        if let Some(from) = equal.frozen_from {
+            let (first, last) = (from + 1, from + equal.longest_run);
+            miette::bail!(
+                help = "find the cause (link, converter, a change of the noise), then record again",
+                "{shown}, rows {first} to {last}: {name}_counts repeat one value, which noise of this level does not do"
+            );
+        }
         let mean = mean_with_uncertainty(&counts);
         let dof = (n / integrated_autocorrelation_time(&counts)).max(2.0) - 1.0;
         let sd = (counts.iter().map(|c| (c - mean.0).powi(2)).sum::<f64>() / (n - 1.0)).sqrt();
