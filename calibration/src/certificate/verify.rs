@@ -1,11 +1,11 @@
 //! The gate between a certificate file and its use.
 
-use super::{Certificate, CertificateKind, date};
+use super::{Certificate, CertificateKind, Parameter, date};
 use nalgebra::DMatrix;
 
 /// Parameters that are above zero by nature: data whose interval reaches zero do not determine them.
 const ABOVE_ZERO: &str = "gain resonance_hz quality_factor step.natural_frequency step.bandwidth step.damping_ratio \
-                          mount.resonance mount.damping_ratio lateral.noise_sd normal.noise_sd orientation.weight";
+                          mount.resonance mount.damping_ratio creep.time_constant lateral.noise_sd normal.noise_sd orientation.weight";
 
 /// Where, when and on what a certificate is to be used.
 #[derive(Clone, Debug, PartialEq)]
@@ -109,6 +109,17 @@ impl Certificate {
                 return malformed(format!(
                     "`{}` is above zero, and its interval ({low:.3e} to {high:.3e}) is not: the data do not determine it",
                     p.name
+                ));
+            }
+            let possible = match p.name.as_str() {
+                "step.delay" => p.value.abs() <= 1.0,
+                "step.natural_frequency" | "mount.resonance" => p.value >= 1.0,
+                _ => true,
+            };
+            if !possible {
+                let Parameter { name, value, unit, .. } = p;
+                return malformed(format!(
+                    "`{name}` of {value:.3} {unit} cannot be: is time_s in milliseconds? It is read in seconds"
                 ));
             }
             if (sd(i) - p.standard_uncertainty).abs() > 1e-6 * p.standard_uncertainty {
