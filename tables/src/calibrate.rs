@@ -14,6 +14,8 @@ mod latency;
 mod noise;
 mod phase;
 mod tables;
+#[cfg(test)]
+mod tests;
 
 use calibration::certificate::{
     Certificate, CertificateKind, Circumstances, Instrument, Occasion, Outcome, Parameter, RawData, Verified,

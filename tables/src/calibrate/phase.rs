@@ -76,8 +76,17 @@ pub fn outcome_of(args: &Args, bench: &dyn Bench, sources: &mut Sources) -> miet
     let plate = decoder("plate", &args.plate_range, &args.plate_delay)?;
     let skin = decoder("skin", &args.skin_range, &args.skin_delay)?;
     let mut shifts: Vec<(f64, Shift)> = Vec::new();
+    let mut seen: Vec<Vec<[f64; 2]>> = Vec::new();
     for path in &args.waveforms {
         let rows = columns(sources, path, ["plate_v", "skin_v"], &[])?;
+        if let Some(first) = seen.iter().position(|other| *other == rows) {
+            miette::bail!(
+                help = "each acquisition counts once: remove the copy, for it would narrow the uncertainty",
+                "{}: its samples are those of {} again",
+                path.display(),
+                args.waveforms[first].display()
+            );
+        }
         let (plate_v, skin_v): (Vec<f64>, Vec<f64>) = rows.iter().map(|r| (r[0], r[1])).unzip();
         let (rate_hz, frequency_hz) = (args.rate_hz, args.frequency_hz);
         let (plate_v, skin_v) = (&plate_v[..], &skin_v[..]);
@@ -87,6 +96,7 @@ pub fn outcome_of(args: &Args, bench: &dyn Bench, sources: &mut Sources) -> miet
         let moved =
             amplitude(plate_v, rate_hz, frequency_hz, &plate).map_err(|e| miette::miette!("{shown}: {e}"))?;
         shifts.push((moved.metres(), found));
+        seen.push(rows);
     }
     shifts.sort_by(|a, b| a.0.total_cmp(&b.0));
     let mut points = Vec::new();
