@@ -301,8 +301,8 @@ pub(super) mod tests {
     use super::super::series::Branch;
     use super::*;
 
-    /// Weights up and down on both axes, laterally both ways, with a lag of `lag` counts and a zero that moves
-    /// by 3 counts/K on the lateral and -2 counts/K on the normal channel.
+    /// Weights up and down on both axes, laterally both ways, with a lag of `lag` counts. The zero moves by 3
+    /// counts/K on the lateral and by -2 counts/K on the normal channel.
     pub(crate) fn series(lag: f64) -> Vec<LoadReading> {
         let largest = 2.0;
         let up = [0.2, 0.5, 1.0, 1.5, 2.0].map(|load| (load, Branch::Up));
