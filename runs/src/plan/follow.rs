@@ -35,6 +35,8 @@ fn demand(target: &Target, shortest_m: Option<f64>) -> Demand {
     let steps = target.mu_relative.windows(2).map(|v| (v[1] - v[0]).abs());
     let steepest_per_m = steps.fold(0.0, f64::max) / target.step_m;
     let sine = 0.5 * TAU * (range[1] - range[0]) / steepest_per_m.max(1e-12);
+    // A flat target has no period.
+    let sine = if sine > 0.0 { sine } else { f64::INFINITY };
     Demand { range, steepest_per_m, period_m: shortest_m.unwrap_or(sine) }
 }
 
@@ -165,5 +167,20 @@ impl Plan {
                 "{period}: friction must rise by {needed}; the finger's pad raises it by {pad} at most"
             ));
         }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// It was one of 0 um, or inf Hz: "slide more slowly".
+    #[test]
+    fn a_flat_target_has_no_period() {
+        let flat =
+            Target { start_m: 0.0, step_m: 0.01, mu_relative: vec![0.5; 3], lead_s: 0.0, feedback: None };
+        assert_eq!(demand(&flat, None).period_m, f64::INFINITY);
+        let bump = Target { mu_relative: vec![0.5, 0.6, 0.5], ..flat };
+        assert!((demand(&bump, None).period_m - 0.01 * std::f64::consts::PI).abs() < 1e-12);
     }
 }

@@ -117,15 +117,22 @@ impl RenderPlan {
     }
 
     pub(super) fn check(&self, wrong: &mut Problems<'_>) {
+        let generated = self.target != TargetKind::Table;
+        let inside = self.mean - self.depth > 0.0 && self.mean + self.depth <= 1.0 && self.depth > 0.0;
+        if generated && !inside {
+            // At a key that is in the file: the other one may have its default.
+            let RenderPlan { mean, depth: half, .. } = *self;
+            let key = if half == depth() || !(0.0..1.0).contains(&mean) { "mean" } else { "depth" };
+            let needed = "mean - depth and depth must be above 0, mean + depth at most 1";
+            let problem = format!("[render] mean = {mean}, depth = {half}: {needed}");
+            wrong.add(&["render", key], problem, "for example mean = 0.6, depth = 0.2".to_string());
+        }
         let mut needs = |key: &str, good: bool, needed: &str| {
             if !good {
                 wrong.add(&["render", key], format!("[render] {key}: {needed}"), None);
             }
         };
         let length = |m: f64| m.is_finite() && (1e-5..=1.0).contains(&m);
-        let generated = self.target != TargetKind::Table;
-        let inside = self.mean - self.depth > 0.0 && self.mean + self.depth <= 1.0 && self.depth > 0.0;
-        needs("depth", !generated || inside, "mean - depth must be above 0, mean + depth at most 1");
         let tolerance = self.tolerance > 0.0 && self.tolerance < 1.0;
         needs("tolerance", tolerance, "a number between 0 and 1 is needed");
         needs("fall", (-2.0..=4.0).contains(&self.fall), "a number from -2 to 4 is needed");
@@ -174,8 +181,9 @@ impl RenderPlan {
         };
         let mut shape: Vec<f64> = (0..count as usize).map(at).collect();
         if self.target == TargetKind::Noise {
-            let most = shape.iter().fold(0.0f64, |most, v| most.max(v.abs()));
-            shape.iter_mut().for_each(|v| *v /= most);
+            let range = [f64::INFINITY, f64::NEG_INFINITY];
+            let [low, high] = shape.iter().fold(range, |[low, high], v| [low.min(*v), high.max(*v)]);
+            shape.iter_mut().for_each(|v| *v = (2.0 * *v - low - high) / (high - low));
         }
         let mu_relative = shape.into_iter().map(|v| self.mean + self.depth * v).collect();
         Ok(Target { start_m: span[0], step_m, mu_relative, lead_s: self.lead_s, feedback: None })
@@ -243,5 +251,60 @@ impl Plan {
             return Err(self.refused(&["render", "file"], problem, remedy).into());
         }
         Ok(Some(Target { feedback, ..target }))
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    const BASE: &str = "name = \"p\"\n[base]\namplitude_pp_m = \"5um\"\nfrequency_hz = 27500\nspeed_m_s = 0.02\n\
+                        normal_force_n = 0.25\n[[series]]\nname = \"a\"\n";
+
+    fn plan(render: &str, series: &str) -> miette::Result<Plan> {
+        Plan::parse("plan.toml", &format!("{BASE}{series}[render]\n{render}"))
+    }
+
+    /// The largest absolute value was taken for half the range: 0.141 to 0.184 for a depth of 0.2.
+    #[test]
+    fn noise_reaches_from_mean_less_depth_to_mean_and_depth() {
+        for seed in 0..5 {
+            let text = format!("target = \"noise\"\nwaves_m = [2e-3, 10e-3]\nfall = 1\nseed = {seed}\n");
+            let values = plan(&text, "").unwrap().target(0.5, None).unwrap().unwrap().mu_relative;
+            let [low, high] = [f64::min, f64::max].map(|of| values.iter().copied().reduce(of).unwrap());
+            assert!((low - 0.4).abs() < 1e-12 && (high - 0.8).abs() < 1e-12, "{low} {high}");
+        }
+    }
+
+    /// It had no line and no remedy, and the depth that nobody wrote was blamed.
+    #[test]
+    fn a_mean_that_cannot_be_is_refused_at_its_line_with_the_remedy() {
+        let why = plan("target = \"ramp\"\nmean = 1.5\n", "").unwrap_err();
+        assert!(format!("{why:?}").contains("plan.toml:11:8"), "{why:?}");
+        assert!(why.help().unwrap().to_string().contains("mean = 0.6"));
+        let why = plan("target = \"ramp\"\ndepth = 0.7\n", "").unwrap_err();
+        assert!(format!("{why:?}").contains("plan.toml:11:9"), "{why:?}");
+    }
+
+    /// The base's load, whatever the series had: 0.168 N were measured where 0.080 N were wanted.
+    #[test]
+    fn newtons_are_divided_by_the_load_of_the_passes_and_two_loads_are_refused() {
+        let folder = tempfile::tempdir().unwrap();
+        // As a spreadsheet writes it.
+        let rows = "\u{feff}x_m,lateral_force_n\r\n-0.05,0.1\r\n0.05,0.1\r\n";
+        std::fs::write(folder.path().join("t.csv"), rows).unwrap();
+        let of = |series: &str| {
+            let mut plan = plan("target = \"table\"\nfile = \"t.csv\"\n", series).unwrap();
+            plan.origin = folder.path().join("plan.toml").display().to_string();
+            plan.target(0.5, None).map(|target| target.unwrap().mu_relative[0])
+        };
+        assert!((of("").unwrap() - 0.8).abs() < 1e-12);
+        assert!((of("normal_force_n = [0.5]\n").unwrap() - 0.4).abs() < 1e-12);
+        let why = of("normal_force_n = [0.25, 0.5]\n").unwrap_err();
+        assert!(
+            why.to_string().contains("t.csv is in N") && why.to_string().contains("[0.25, 0.5] N"),
+            "{why}"
+        );
+        assert!(why.help().unwrap().to_string().contains("one plan for each load"));
     }
 }

@@ -2,7 +2,7 @@
 
 use super::{MOST, RenderPlan};
 use crate::input::{BadInput, text_of};
-use crate::plan::Plan;
+use crate::plan::{Plan, Series};
 use crate::run_dir::sha256_of;
 use models::target::Target;
 use std::path::{Path, PathBuf};
@@ -34,18 +34,26 @@ impl RenderPlan {
         let path = self.path(plan);
         let text = text_of(&path)?;
         let shown = path.display().to_string();
-        self.rows(&text, mu0 * plan.file.base.normal_force_n).map_err(|(problem, remedy)| {
+        let base = plan.file.base.normal_force_n;
+        let of = |s: &Series| if s.normal_force_n.is_empty() { vec![base] } else { s.normal_force_n.clone() };
+        let mut loads_n: Vec<f64> = plan.file.series.iter().flat_map(of).collect();
+        loads_n.dedup();
+        self.rows(text.trim_start_matches('\u{feff}'), mu0, &loads_n).map_err(|(problem, remedy)| {
             BadInput::new(&shown, &text, None, format!("{shown}{problem}"), remedy.to_string()).into()
         })
     }
 
-    /// The same from the file's text; `full_n` is the friction without vibration in N.
-    fn rows(&self, text: &str, full_n: f64) -> Result<Target, Refused> {
+    /// The same from the file's text, for passes at these loads in N.
+    fn rows(&self, text: &str, mu0: f64, loads_n: &[f64]) -> Result<Target, Refused> {
         let mut lines = text.lines().enumerate().filter(|(_, l)| !l.trim().is_empty() && !l.starts_with('#'));
         let head = lines.next().map_or("", |(_, l)| l.trim());
         let scale = match head {
             "x_m,mu_relative" => 1.0,
-            "x_m,lateral_force_n" => 1.0 / full_n,
+            "x_m,lateral_force_n" if loads_n.len() == 1 => 1.0 / (mu0 * loads_n[0]),
+            "x_m,lateral_force_n" => {
+                let problem = format!(" is in N, and the passes have the loads {loads_n:?} N");
+                return Err((problem, "write one plan for each load, or a target of x_m,mu_relative"));
+            }
             _ => {
                 let problem = format!(" begins with '{head}'");
                 return Err((problem, "a target's columns are x_m,mu_relative or x_m,lateral_force_n"));
