@@ -22,14 +22,21 @@ pub mod plots;
 pub mod published;
 pub mod traces;
 
+use crate::job::Summary;
 use crate::run_data::read;
 use std::path::Path;
 
 pub use explore::{EXPLORE, FIGURES, UPLOT, UPLOT_STYLE};
 pub use html::{escape, scoped_style};
 
-/// The report of a run as HTML, with published values on its axes; and what is damaged in the folder.
-pub fn html(folder: &Path, overlay: &[published::Published]) -> miette::Result<(String, Vec<String>)> {
-    let run = read(folder)?;
+/// The report of a run as HTML, with published values on its axes; and what is damaged in the folder. `ended`:
+/// a summary that is not in the folder yet.
+pub fn html(
+    folder: &Path,
+    overlay: &[published::Published],
+    ended: Option<&Summary>,
+) -> miette::Result<(String, Vec<String>)> {
+    let mut run = read(folder)?;
+    run.summary = ended.cloned().or(run.summary);
     Ok((page::page(&run, &traces::of(folder)?, overlay)?, run.damage))
 }

@@ -35,11 +35,8 @@ pub fn run(args: Args, json: bool) -> miette::Result<ExitCode> {
     }
     let overlay: miette::Result<Vec<_>> = args.overlay.iter().map(|name| published::of(name)).collect();
     // Made again from the record, so that the page and the file agree with this version.
-    let fidelity = match args.run.join(runs::fidelity::FILE).is_file() {
-        true => runs::fidelity::write(&args.run)?,
-        false => None,
-    };
-    let (html, damage) = runs::report::html(&args.run, &overlay?.concat())?;
+    let fidelity = runs::fidelity::write(&args.run)?;
+    let (html, damage) = runs::report::html(&args.run, &overlay?.concat(), None)?;
     let out = args.out.unwrap_or_else(|| args.run.join("report.html"));
     runs::files::write_output(&out, html)?;
     if json {

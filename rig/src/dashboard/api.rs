@@ -158,7 +158,7 @@ async fn run(State(shared): Server, Path(name): Path<String>) -> Answer {
 
 async fn report(State(shared): Server, Path(name): Path<String>) -> Answer {
     let folder = folder(&shared, &name)?;
-    let found = beside(move || runs::report::html(&folder, &[])).await?;
+    let found = beside(move || runs::report::html(&folder, &[], None)).await?;
     Ok(found.map_or_else(|why| failed_to(&why), |(page, _)| html(page)))
 }
 

@@ -244,11 +244,16 @@ impl RunWriter {
     }
 
     fn write_end(&self, summary: &Summary) -> miette::Result<()> {
+        let pages = || {
+            crate::fidelity::write(self.dir.path()).wrap_err("the fidelity")?;
+            let html = crate::report::html(self.dir.path(), &[], Some(summary)).wrap_err("the report")?.0;
+            self.dir.write("report.html", html.as_bytes()).wrap_err("the report")
+        };
+        let written = pages();
+        // Last, whatever became of them: with it a run is complete, and nothing is written again.
         let text = serde_json::to_vec_pretty(&Remarked::of(summary)).into_diagnostic()?;
         self.dir.write(SUMMARY, &text).wrap_err("the summary")?;
-        crate::fidelity::write(self.dir.path()).wrap_err("the fidelity")?;
-        let (html, _) = crate::report::html(self.dir.path(), &[]).wrap_err("the report")?;
-        self.dir.write("report.html", html.as_bytes()).wrap_err("the report")
+        written
     }
 
     /// A new record file of the run.
