@@ -111,7 +111,10 @@ pub struct Group {
     pub shift_m: [Option<f64>; 2],
     /// Standard deviation of that way over the passes, in m; none of single passes.
     pub shift_sd_m: Option<f64>,
-    /// Root-mean-square difference of `mu'` once that way is taken out.
+    /// Why it is missing of passes that were made, and with it the delays of the parts.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub shift_missing: Option<String>,
+    /// Root-mean-square difference of `mu'` once that way is taken out; as it is of passes without one.
     pub rms_shifted: f64,
     /// The same with the known delay taken out; none where no dynamics are known.
     pub rms_known: Option<f64>,
@@ -258,14 +261,16 @@ fn group(
     let late = lateness::of(passes, speed, known.as_ref(), rendering);
     let mean = |values: &[f64]| values.iter().sum::<f64>() / values.len().max(1) as f64;
     let ways = |forward: bool| -> Vec<f64> {
-        passes.iter().zip(&late.ways).filter(|(pass, _)| pass.forward == forward).map(|(_, w)| *w).collect()
+        let found = passes.iter().zip(&late.ways).filter(|(pass, _)| pass.forward == forward);
+        found.filter_map(|(_, way)| *way).collect()
     };
     let [forward, backward] = [ways(true), ways(false)];
+    let all: Vec<f64> = late.ways.iter().flatten().copied().collect();
     let off = [&forward, &backward].map(|w| w.iter().map(|v| (v - mean(w)).powi(2)).sum::<f64>());
     let shift_of = |w: &[f64]| (!w.is_empty()).then(|| mean(w));
     // Passes beyond the one that gives the shift of each way.
-    let spare = passes.len().saturating_sub([&forward, &backward].iter().filter(|w| !w.is_empty()).count());
-    let delay = (mean(&late.ways) / (speed * cycle_s)).round().max(0.0) as usize;
+    let spare = all.len().saturating_sub([&forward, &backward].iter().filter(|w| !w.is_empty()).count());
+    let delay = (mean(&all) / (speed * cycle_s)).round().max(0.0) as usize;
     let bins = |segments: usize| {
         let mut spectra = Spectra::for_passes(passes.iter().map(|p| p.samples.len()), segments, cycle_s);
         for pass in passes {
@@ -294,6 +299,7 @@ fn group(
         rms_law: rms(|s| s.measured - s.predicted),
         shift_m: [shift_of(&forward), shift_of(&backward)],
         shift_sd_m: (spare > 0).then(|| (off.iter().sum::<f64>() / spare as f64).sqrt()),
+        shift_missing: late.ways.contains(&None).then(|| lateness::HIDDEN.into()),
         rms_shifted: late.rms_shifted,
         rms_known: late.rms_known,
         rms_held_out: late.rms_held_out,

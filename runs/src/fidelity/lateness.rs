@@ -4,6 +4,7 @@
 
 use super::dynamics::Dynamics;
 use super::{Rendered, Sample};
+use calibration::uncertainty::student::coverage_factor;
 use serde::{Deserialize, Serialize};
 
 /// How late a part comes.
@@ -23,9 +24,9 @@ pub struct Late {
 
 /// What the lateness of the passes of a group comes to.
 pub(super) struct Found {
-    /// Way in m by which the measured friction comes after the wanted one, for each pass.
-    pub ways: Vec<f64>,
-    /// Root-mean-square difference of `mu'` with that way taken out of each pass.
+    /// Way in m by which the measured friction comes after the wanted one, for each pass; none: [`HIDDEN`].
+    pub ways: Vec<Option<f64>>,
+    /// Root-mean-square difference of `mu'` with that way taken out of each pass that has one.
     pub rms_shifted: f64,
     /// The same with the known delay taken out.
     pub rms_known: Option<f64>,
@@ -34,6 +35,10 @@ pub(super) struct Found {
     /// The parts.
     pub parts: Vec<Late>,
 }
+
+/// Why a pass has no way of best agreement.
+pub(super) const HIDDEN: &str =
+    "a shift looks like an offset or a gain of mu' on this stroke, or is beyond what is searched";
 
 /// Steps of the search either side of what is known.
 const STEPS: i32 = 120;
@@ -45,9 +50,16 @@ const UP_TO_PERIODS: f64 = 0.45;
 const UP_TO_PASS: f64 = 0.25;
 /// Samples of a pass that are compared at most.
 const COMPARED: usize = 2000;
-/// Standard deviations, and cycles of the loop, by which a part that is slower than known exceeds it.
-const SURE: f64 = 3.0;
+/// Misfit on both sides of the best way, at least, beside that of the best.
+const SHOWN: f64 = 1.5;
+/// Mean square of `mu'` that is rounding.
+const ROUNDING: f64 = 1e-12;
+/// Coverage of the interval (three standard deviations of many passes), and cycles of the loop, by which a part
+/// that is slower than known exceeds it.
+const SURE: f64 = 0.9973;
 const RESOLVED_CYCLES: f64 = 1.5;
+/// Passes that show scatter at least.
+const PASSES_MIN: f64 = 3.0;
 
 /// Two series of a pass over the way that was slid.
 struct Pair {
@@ -70,17 +82,34 @@ impl Pair {
         sum / count.max(1.0)
     }
 
-    /// The way of best agreement within `half` of `around`, with a parabola through the three best steps, and
-    /// whether it lies inside.
-    fn way(&self, around: f64, half: f64) -> (f64, bool) {
+    /// The same between these places, less the best offset and gain: a law that is off is not late. A gain
+    /// below 0 would take half a period for agreement.
+    fn misfit(&self, way: f64, [low, high]: [f64; 2]) -> f64 {
+        let inside = self.to.iter().filter(|(x, _)| (low..=high).contains(x));
+        let pairs: Vec<[f64; 2]> = inside.filter_map(|(x, y)| Some([at(&self.from, x - way)?, *y])).collect();
+        let [mx, my] = [0, 1].map(|i| mean(pairs.iter().map(|pair| pair[i])));
+        let product =
+            |i: usize, j: usize| mean(pairs.iter().map(|p| (p[i] - [mx, my][i]) * (p[j] - [mx, my][j])));
+        let (xx, xy) = (product(0, 0), product(0, 1).max(0.0));
+        product(1, 1) - if xx > 0.0 { xy * xy / xx } else { 0.0 }
+    }
+
+    /// The way of best agreement within `half` of `around`, with a parabola through the three best steps.
+    fn way(&self, around: f64, half: f64) -> Option<f64> {
+        let [first, last] = [self.from.first()?.0, self.from.last()?.0];
+        // The same places for all ways: on a straight line the misfit is then the same.
+        let places = [first + around + half, last + around - half];
         let step = half / f64::from(STEPS);
-        let all: Vec<f64> = (-STEPS..=STEPS).map(|k| self.off(around + f64::from(k) * step)).collect();
+        let of = |k: i32| self.misfit(around + f64::from(k) * step, places);
+        let all: Vec<f64> = (-STEPS..=STEPS).map(of).collect();
         let best = (0..all.len()).min_by(|a, b| all[*a].total_cmp(&all[*b])).unwrap_or(0);
-        let place = best.clamp(1, all.len() - 2);
-        let [a, b, c] = [all[place - 1], all[place], all[place + 1]];
-        let bend = a - 2.0 * b + c;
-        let part = if bend > 0.0 { (0.5 * (a - c) / bend).clamp(-1.0, 1.0) } else { 0.0 };
-        (around + step * (place as f64 - f64::from(STEPS) + part), place == best && bend > 0.0)
+        let most = |values: &[f64]| values.iter().copied().fold(0.0, f64::max);
+        if most(&all[..best]).min(most(&all[best..])) <= SHOWN * all[best] + ROUNDING {
+            return None;
+        }
+        let [a, b, c] = [all[best - 1], all[best], all[best + 1]];
+        let part = 0.5 * (a - c) / (a - 2.0 * b + c);
+        Some(around + step * (best as f64 - f64::from(STEPS) + part))
     }
 }
 
@@ -103,38 +132,31 @@ pub(super) fn of(
     known: Option<&Dynamics>,
     (lead_s, period_m, open): (f64, Option<f64>, bool),
 ) -> Found {
-    let slid = |pass: &&Rendered| match (pass.samples.first(), pass.samples.last()) {
-        (Some(first), Some(last)) => (last.x_m - first.x_m).abs(),
-        _ => 0.0,
-    };
+    let slid = |pass: &&Rendered| (pass.samples[pass.samples.len() - 1].x_m - pass.samples[0].x_m).abs();
     let shortest = passes.iter().map(slid).fold(f64::INFINITY, f64::min);
     let most = period_m.map_or(f64::INFINITY, |m| UP_TO_PERIODS * m).min(UP_TO_PASS * shortest);
     let half = (UP_TO_S * speed).max(UP_TO_M).min(most);
-    let found = |known_s: f64, from: fn(&Sample) -> f64, to: fn(&Sample) -> f64| -> Vec<(Pair, f64, bool)> {
-        let each = |pass: &&Rendered| {
-            let pair = Pair::of(pass, from, to);
-            let (way, inside) = pair.way(known_s * speed, half);
-            (pair, way, inside)
+    let found =
+        |known_s: f64, from: fn(&Sample) -> f64, to: fn(&Sample) -> f64| -> Vec<(Option<f64>, Pair)> {
+            let pairs = passes.iter().map(|pass| Pair::of(pass, from, to));
+            pairs.map(|pair| (pair.way(known_s * speed, half), pair)).collect()
         };
-        passes.iter().map(each).collect()
-    };
     let expected = known.map(|known| known.delay_s() - lead_s);
     let all = found(expected.unwrap_or(0.0), |s| s.wanted, |s| s.measured);
     let rms = |way: &dyn Fn(usize) -> f64| {
-        mean(all.iter().enumerate().map(|(i, (pair, ..))| pair.off(way(i)))).sqrt()
+        mean(all.iter().enumerate().map(|(i, (_, pair))| pair.off(way(i)))).sqrt()
     };
-    let ways: Vec<f64> = all.iter().map(|found| found.1).collect();
-    let others = |i: usize| (ways.iter().sum::<f64>() - ways[i]) / (ways.len() - 1) as f64;
+    let ways: Vec<Option<f64>> = all.iter().map(|found| found.0).collect();
+    let others = |i: usize| mean(ways[..i].iter().chain(&ways[i + 1..]).copied().flatten());
     let part = |name: &str, known_s: f64, from, to| {
-        let found = found(known_s, from, to);
+        let found: Vec<f64> = found(known_s, from, to).into_iter().map(|f| f.0).collect::<Option<_>>()?;
         let n = found.len() as f64;
-        let delay_s = mean(found.iter().map(|f| f.1 / speed));
-        let square = mean(found.iter().map(|f| (f.1 / speed - delay_s).powi(2)));
-        let sd_s = (square / (n - 1.0)).sqrt();
+        let delay_s = mean(found.iter().map(|way| way / speed));
+        let sd_s = (mean(found.iter().map(|way| (way / speed - delay_s).powi(2))) / (n - 1.0)).sqrt();
         let cycle_s = known.map_or(0.0, |known| known.cycle_s);
-        let slower = delay_s - known_s > (SURE * sd_s).max(RESOLVED_CYCLES * cycle_s);
-        let late = Late { part: name.into(), delay_s, sd_s, known_s, slower };
-        (n > 1.0 && found.iter().all(|f| f.2)).then_some(late)
+        let least = (coverage_factor(SURE, n - 1.0) * sd_s).max(RESOLVED_CYCLES * cycle_s);
+        let slower = n >= PASSES_MIN && delay_s - known_s > least;
+        (n > 1.0).then(|| Late { part: name.into(), delay_s, sd_s, known_s, slower })
     };
     let parts = known.filter(|_| open).map_or_else(Vec::new, |known| {
         let [sensor, before] = [known.sensor_part_s(), known.delay_s() - known.sensor_part_s()];
@@ -142,9 +164,9 @@ pub(super) fn of(
         drive.into_iter().chain(part("sensor", sensor, |s| s.predicted, |s| s.measured)).collect()
     });
     Found {
-        rms_shifted: rms(&|i| ways[i]),
+        rms_shifted: rms(&|i| ways[i].unwrap_or(0.0)),
         rms_known: expected.map(|s| rms(&|_| s * speed)),
-        rms_held_out: (ways.len() > 1).then(|| rms(&others)),
+        rms_held_out: (ways.iter().flatten().count() > 1).then(|| rms(&others)),
         parts,
         ways,
     }
@@ -182,7 +204,59 @@ mod tests {
         let [drive, sensor] = &found.parts[..] else { panic!("{:?}", found.parts) };
         assert!((drive.delay_s - 6e-3).abs() < 5e-5 && drive.slower, "{drive:?}");
         assert!((sensor.delay_s - 2e-3).abs() < 5e-5 && !sensor.slower, "{sensor:?}");
-        assert!(found.ways.iter().all(|way| (way / speed - 8e-3).abs() < 5e-5), "{:?}", found.ways);
+        assert!(found.ways.iter().all(|way| (way.unwrap() / speed - 8e-3).abs() < 5e-5), "{:?}", found.ways);
         assert!(found.rms_known.unwrap() > 0.05 && found.rms_held_out.unwrap() < 2e-3);
+    }
+
+    /// Passes of `shape` with these delays of the measurement in s, and `mu'` off by an offset and a gain.
+    fn passes(shape: fn(f64) -> f64, late_s: &[f64]) -> Vec<Rendered> {
+        let pass = |late_s: &f64| {
+            let of = |k: u32| {
+                let x_m = 2e-5 * f64::from(k);
+                // A small wave that the target does not have.
+                let measured = 0.03 + 1.1 * shape(x_m - 0.02 * late_s) + 0.003 * (9e3 * x_m).sin();
+                let wanted = shape(x_m);
+                Sample { x_m, wanted, commanded_pp_m: 1e-6, predicted: wanted, measured, reached: true }
+            };
+            let samples = (0..1000).map(of).collect();
+            Rendered { point: 0, key: [0.02, 0.25, 3e4], forward: true, samples }
+        };
+        late_s.iter().map(pass).collect()
+    }
+
+    fn found(passes: &[Rendered]) -> Found {
+        let known = Dynamics {
+            ring_time_s: 0.0,
+            amplifier_s: 0.0,
+            cycle_s: 1e-4,
+            sensor_hz: None,
+            sensor_delay_s: 1.6e-3,
+            pad_n_per_m: None,
+        };
+        of(&passes.iter().collect::<Vec<_>>(), 0.02, Some(&known), (0.0, None, true))
+    }
+
+    /// An offset of a ramp looked like 59 ms, and the sensor was accused.
+    #[test]
+    fn a_ramp_has_no_delay_and_a_bump_that_is_off_has_the_one_put_in() {
+        let ramp = found(&passes(|x| 0.4 + 20.0 * x, &[1.6e-3; 3]));
+        assert!(ramp.ways.iter().all(|way| way.is_none()) && ramp.parts.is_empty(), "{:?}", ramp.ways);
+        assert!(ramp.rms_held_out.is_none() && ramp.rms_shifted > 0.02, "{}", ramp.rms_shifted);
+        let bump = |x: f64| 0.4 + 0.2 * (1.0 - (x - 0.01).abs() / 0.004).max(0.0);
+        let near = found(&passes(bump, &[1.6e-3; 3]));
+        assert!(near.ways.iter().all(|way| (way.unwrap() - 3.2e-5).abs() < 4e-6), "{:?}", near.ways);
+        // Beyond the search: its bound was stated as found.
+        let far = found(&passes(bump, &[0.15; 3]));
+        assert!(far.ways.iter().all(|way| way.is_none()), "{:?}", far.ways);
+    }
+
+    /// Three standard deviations of two or three passes are little: one of 22 sound sensors was accused.
+    #[test]
+    fn few_passes_that_scatter_accuse_no_sensor() {
+        let bump = |x: f64| 0.4 + 0.2 * (-((x - 0.01) / 0.002).powi(2)).exp();
+        let slower = |late_s: &[f64]| found(&passes(bump, late_s)).parts.last().unwrap().slower;
+        assert!(!slower(&[5e-3; 2]), "two passes");
+        assert!(!slower(&[3.0e-3, 4.0e-3, 3.6e-3]), "6 standard deviations of the mean of three");
+        assert!(slower(&[5e-3, 5.1e-3, 5.0e-3]) && slower(&[3.0e-3, 4.0e-3, 3.6e-3, 3.4e-3, 3.5e-3, 3.6e-3]));
     }
 }

@@ -35,8 +35,9 @@ fn shift(group: &Group) -> String {
     format!("{} / {}", mm(group.shift_m[0]), mm(group.shift_m[1]))
 }
 
-/// The parts that come later than known, in sentences.
-fn slower(group: &Group) -> Vec<String> {
+/// Why there is no shift, and the parts that come later than known, in sentences.
+fn delays(group: &Group) -> Vec<String> {
+    let missing = group.shift_missing.iter().map(|why| format!("passes without a shift: {why}"));
     let of = |late: &Late| {
         // Scatter below 10 us is stated as 10 us.
         let [delay, sd, known] =
@@ -54,7 +55,7 @@ fn slower(group: &Group) -> Vec<String> {
         };
         format!("{what} {delay} \u{b1} {sd} ms late, {known} ms are known: {remedy}")
     };
-    group.late.iter().filter(|late| late.slower).map(of).collect()
+    missing.chain(group.late.iter().filter(|late| late.slower).map(of)).collect()
 }
 
 /// Lines for a terminal.
@@ -64,19 +65,21 @@ pub fn lines(fidelity: &Fidelity) -> Vec<String> {
             0.0 => String::new(),
             share => format!("; {:.0} % of the way could not be had", 100.0 * share),
         };
+        let shifted = match (group.shift_m, group.rms_shifted) {
+            ([None, None], _) => String::new(),
+            (_, rms) => format!(", {rms:.3} without the shift of {} mm (forward / backward)", shift(group)),
+        };
         let first = [
             format!(
-                "rendered at {}: mu' off by {:.3} rms ({:.0} % within {}), {:.3} without the shift of {} mm (forward / backward){saturated}",
+                "rendered at {}: mu' off by {:.3} rms ({:.0} % within {}){shifted}{saturated}",
                 quantity(group.speed_m_s, "m/s"),
                 group.rms,
                 100.0 * group.within_tolerance,
                 fidelity.tolerance,
-                group.rms_shifted,
-                shift(group),
             ),
             format!("  {}", ends(group)),
         ];
-        first.into_iter().chain(slower(group).into_iter().map(|line| format!("  {line}"))).collect::<Vec<_>>()
+        first.into_iter().chain(delays(group).into_iter().map(|line| format!("  {line}"))).collect::<Vec<_>>()
     };
     fidelity.groups.iter().flat_map(of).chain(fidelity.remarks.iter().cloned()).collect()
 }
@@ -118,7 +121,7 @@ pub(super) fn section(fidelity: &Fidelity) -> miette::Result<String> {
     }
     let at = |group: &Group| {
         let speed = quantity(group.speed_m_s, "m/s");
-        slower(group).into_iter().map(move |line| format!("at {speed} {line}")).collect::<Vec<_>>()
+        delays(group).into_iter().map(move |line| format!("at {speed} {line}")).collect::<Vec<_>>()
     };
     let remarks: Vec<String> =
         fidelity.remarks.iter().cloned().chain(fidelity.groups.iter().flat_map(at)).collect();
