@@ -109,10 +109,10 @@ fn a_waveform_counts_once() {
         std::fs::write(&path, text).unwrap();
         path
     };
-    let (first, second) = (wave("a.csv", "", 0.0), wave("b.csv", "", 0.3));
+    let (first, second, third) = (wave("a.csv", "", 0.0), wave("b.csv", "", 0.3), wave("c.csv", "", 0.8));
     let copy = wave("copy.csv", "# another name\n", 0.0);
     let words = format!("phase --rate-hz 1e6 --phases {}", folder.path().join("PHASES.csv").display());
-    assert_eq!(refusal(&words, &[&first, &second]), "");
+    assert_eq!(refusal(&words, &[&first, &second, &third]), "");
     for files in [[first.as_path(), &second, &first], [&first, &second, &copy]] {
         let said = refusal(&words, &files);
         assert!(
