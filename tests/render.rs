@@ -255,7 +255,7 @@ fn a_target_that_is_a_thousand_times_too_long_is_refused_and_one_pass_has_no_sca
     let group = &read(&out).unwrap().groups[0];
     assert_eq!((group.passes, group.shift_sd_m), (2, None));
     assert!(group.shift_m.iter().all(Option::is_some), "{:?}", group.shift_m);
-    // The summary makes a run complete: it came before the fidelity, which a kill between the two lost for good.
+    // The summary makes a run complete: it came before the fidelity, which a kill between them lost for good.
     let written = |name: &str| std::fs::metadata(out.join(name)).unwrap().modified().unwrap();
     let before = [written("fidelity.json"), written("report.html")];
     assert!(before.iter().all(|at| *at <= written("summary.json")), "{before:?}");

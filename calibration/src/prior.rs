@@ -7,8 +7,8 @@ use crate::force::apply::ForceCalibration;
 use crate::force::zero::Zero;
 use models::rig_file::Calibration;
 
-/// Takes one verified certificate into what is known, at a temperature. Kinds that say nothing of the readings
-/// change nothing.
+/// Takes one verified certificate into what is known, at a temperature. Kinds that say nothing of the
+/// readings change nothing.
 ///
 /// # Errors
 /// A certificate that cannot be compiled.

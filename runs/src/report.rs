@@ -29,8 +29,8 @@ use std::path::Path;
 pub use explore::{EXPLORE, FIGURES, UPLOT, UPLOT_STYLE};
 pub use html::{escape, scoped_style};
 
-/// The report of a run as HTML, with published values on its axes; and what is damaged in the folder. `ended`:
-/// a summary that is not in the folder yet.
+/// The report of a run as HTML, with published values on its axes; and what is damaged in the folder.
+/// `ended`: a summary that is not in the folder yet.
 pub fn html(
     folder: &Path,
     overlay: &[published::Published],

@@ -164,8 +164,8 @@ pub struct EqualSamples {
     pub upper: f64,
     /// Longest run of equal samples that was seen.
     pub longest_run: usize,
-    /// Where that run begins (counted from 0), if fewer than one in a million records of such noise have it. No
-    /// value is likelier than the root of the share of equal pairs, wherever the mean lies.
+    /// Where that run begins (counted from 0), if fewer than one in a million records of such noise have it.
+    /// No value is likelier than the root of the share of equal pairs, wherever the mean lies.
     pub frozen_from: Option<usize>,
 }
 

@@ -54,8 +54,8 @@ const COMPARED: usize = 2000;
 const SHOWN: f64 = 1.5;
 /// Mean square of `mu'` that is rounding.
 const ROUNDING: f64 = 1e-12;
-/// Coverage of the interval (three standard deviations of many passes), and cycles of the loop, by which a part
-/// that is slower than known exceeds it.
+/// Coverage of the interval (three standard deviations of many passes), and cycles of the loop, by which a
+/// part that is slower than known exceeds it.
 const SURE: f64 = 0.9973;
 const RESOLVED_CYCLES: f64 = 1.5;
 /// Passes that show scatter at least.
