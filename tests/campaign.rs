@@ -5,7 +5,9 @@ use rayon::prelude::*;
 use runs::campaign::{self, Campaign};
 use runs::job::{Job, Signals};
 use std::collections::BTreeMap;
+use std::io::{BufRead, BufReader};
 use std::path::Path;
+use std::process::{Command, Stdio};
 use std::sync::Arc;
 use studies::campaign::claims::{Answer, Claim, Trend, claims, trend};
 use tests::muprime;
@@ -227,6 +229,34 @@ fn a_campaign_goes_on_with_the_files_that_it_began_with() {
     }
     let (status, told) = run(&["run", "deep/made", "--fast"]);
     assert!(status == Some(0) && told.contains("2 of 2 sessions"), "{told}");
+}
+
+/// A Ctrl-C between two sessions was lost: all later ones were made, with status 0.
+#[test]
+fn a_stop_between_two_sessions_ends_the_campaign() {
+    let folder = tempfile::tempdir().unwrap();
+    tests::short_plan(folder.path());
+    let text = "name = \"own\"\nplan = \"short.toml\"\nblocks = 4\n[[cell]]\nname = \"a\"\nsetup = \"virtual-ideal\"\n";
+    std::fs::write(folder.path().join("own.toml"), text).unwrap();
+    let mut child = muprime()
+        .current_dir(folder.path())
+        .args(["run", "own.toml", "--fast"])
+        .stdout(Stdio::null())
+        .stderr(Stdio::piped())
+        .spawn()
+        .unwrap();
+    let mut told = Vec::new();
+    for line in BufReader::new(child.stderr.take().unwrap()).lines().map(Result::unwrap) {
+        // The last line of the first session.
+        if line.contains("report: ") && told.iter().all(|before: &String| !before.contains("report: ")) {
+            assert!(Command::new("kill").args(["-INT", &child.id().to_string()]).status().unwrap().success());
+        }
+        told.push(line);
+    }
+    let told = told.join("\n");
+    assert_eq!(child.wait().unwrap().code(), Some(1), "{told}");
+    assert!(!told.contains("session 3 of 4") && !told.contains("leaving at once"), "{told}");
+    assert!(told.contains("repeat the command: muprime run own.toml --fast --out="), "{told}");
 }
 
 /// What a campaign cannot be is refused with its place, and nothing is made.

@@ -3,7 +3,7 @@
 
 use serde_json::Value;
 use std::path::Path;
-use std::process::Stdio;
+use std::process::{Command, Stdio};
 use std::time::Duration;
 use studies::cases::crash_points::{STEPS, VARIABLE};
 use studies::cases::kinds::Cell;
@@ -258,4 +258,76 @@ fn a_surrogate_grows_in_rounds_until_held_out_cases_are_met() {
     let before = made();
     assert_eq!(said(&words), found);
     assert_eq!((std::fs::read(&surrogate).unwrap(), made()), (kept, before));
+}
+
+/// Standard output was empty, though a program waits for a document there.
+#[test]
+fn ctrl_c_leaves_a_document_that_says_that_it_is_partial() {
+    let folder = tempfile::tempdir().unwrap();
+    let (file, out) = (folder.path().join("cases.jsonl"), folder.path().join("out").display().to_string());
+    ridge_cases(&file, 4000);
+    let cases = text(&file);
+    let all = [
+        vec!["submit", cases, "--out", &out, "--case-s", "1"],
+        vec!["model", "patch"],
+        vec!["model", "stiffness", "--survey"],
+        vec!["model", "reproduce", "fig9", "--out", &out],
+    ];
+    for args in all {
+        let mut command = muprime();
+        let child =
+            command.args(&args).arg("--json").stdout(Stdio::piped()).stderr(Stdio::null()).spawn().unwrap();
+        let status = format!("/proc/{}/status", child.id());
+        // Once the program listens for SIGINT, the second of the signals that it catches.
+        let listens = || {
+            let facts = std::fs::read_to_string(&status).unwrap();
+            let caught = facts.lines().find_map(|line| line.strip_prefix("SigCgt:")).unwrap();
+            u64::from_str_radix(caught.trim(), 16).unwrap() & 2 != 0
+        };
+        while !listens() {
+            pause(Duration::from_millis(10));
+        }
+        assert!(run(Command::new("kill").args(["-INT", &child.id().to_string()])).status.success());
+        let output = child.wait_with_output().unwrap();
+        assert_eq!(output.status.code(), Some(130), "{args:?}");
+        let document: Value = serde_json::from_slice(&output.stdout).unwrap();
+        assert_eq!(document["partial"], true, "{args:?}: {document}");
+    }
+}
+
+/// A study without one result ended with 0, and was said to have all of them.
+#[test]
+fn a_study_whose_cases_all_fail_is_a_failure_and_a_variable_stated_twice_is_refused() {
+    let folder = tempfile::tempdir().unwrap();
+    let at = |name: &str| folder.path().join(name).display().to_string();
+    let asked = |args: &[&str]| {
+        let output = muprime().args(args).arg("--json").output().unwrap();
+        (output.status.code(), serde_json::from_slice::<Value>(&output.stdout).unwrap())
+    };
+    std::fs::write(at("twice.csv"), "mu0,mu0\n0.4,0.5\n").unwrap();
+    std::fs::write(at("once.csv"), "mu0\n0.4\n").unwrap();
+    std::fs::write(at("micro.csv"), "amplitude_pp_m\n2\n").unwrap();
+    let (twice, once, micro) = (at("twice.csv"), at("once.csv"), at("micro.csv"));
+    for wrong in [
+        &["--draw", "3", "--span", "mu0=0.3..0.5", "--span", "mu0=0.4..0.6"][..],
+        &["--draw", "3", "--span", "mu0=0.3..0.5", "--set", "mu0=0.4"],
+        &["--draw", "3", "--span", "amplitude_pp_m=0.3..5"],
+        &["--from", &twice],
+        &["--from", &once, "--set", "mu0=0.5"],
+        &["--from", &micro],
+    ] {
+        let (status, document) = asked(&[&["cases", "ridge", "-o", &at("cases.jsonl")], wrong].concat());
+        assert!(status == Some(2) && document["help"].is_string(), "{wrong:?}: {document}");
+    }
+    let file = at("cases.jsonl");
+    assert_eq!(asked(&["cases", "ridge", "-o", &file, "--draw", "2", "--span", "mu0=0.3..0.5"]).0, Some(0));
+    // As a study of an earlier version has it: beyond what a ridge can have.
+    let text = std::fs::read_to_string(&file).unwrap().replace("0.3", "30").replace("0.5", "50");
+    std::fs::write(&file, text).unwrap();
+    let (status, document) = asked(&["submit", &file, "--out", &at("study"), "--case-s", "1"]);
+    assert_eq!(
+        (status, &document["failed"], &document["missing"]),
+        (Some(1), &2.into(), &0.into()),
+        "{document}"
+    );
 }

@@ -143,7 +143,7 @@ fn forces_stay_bounded_whatever_is_commanded() {
                 });
                 world.command_stage(StageInput { velocity_m_s, normal_force_n });
                 world.advance_to(Nanos((i as u64 + 1) * 40 * MS));
-                let truth = world.truth();
+                let truth = world.truth;
                 let bound = 0.5 * truth.normal_force_n * (1.0 + 6.0 * 0.015) + 1e-9;
                 prop_assert!(truth.lateral_force_n.abs() <= bound, "{:?}", truth);
                 prop_assert!(truth.normal_force_n <= 2.0 * 1.06);

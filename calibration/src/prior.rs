@@ -27,7 +27,7 @@ pub fn take(known: &mut Calibration, verified: Verified, temperature_c: Option<f
             }
         }
         CertificateKind::Amplitude => {
-            known.amplitude_gain_sd = Some(AmplitudeCalibration::compile(verified)?.gain_relative_sd());
+            known.amplitude_gain_sd = Some(AmplitudeCalibration::compile(verified)?.gain_relative_sd);
         }
         CertificateKind::Latency
         | CertificateKind::Phase

@@ -57,7 +57,7 @@ impl Kernels {
     /// The kernels on a table's passes, for these effects.
     pub fn on(problem: &Problem, table: &Table, effects: &[usize]) -> Self {
         let k = &problem.constants;
-        let (coordinates, weather) = (Coordinates::of(table), Coordinates::with_weather(table));
+        let (coordinates, weather) = (Coordinates::of(table), Coordinates::from(table, 0.0));
         let over = |coordinates: &Coordinates, lengths: &Lengths, by_run: bool| {
             let place = |p: &Condition| coordinates.place(&at_start(p, by_run), lengths);
             let places: Vec<_> = problem.passes.iter().map(place).collect();

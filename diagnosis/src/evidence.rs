@@ -17,7 +17,8 @@ use statrs::function::erf::erfc;
 
 /// Rounds of the search for a mode, at the three shares of form uncertainty.
 const MODE_ROUNDS: [usize; 3] = [4, 6, 3];
-/// Damping of that search: at the start, its factors after a step that helps and one that does not, and its bounds.
+/// Damping of that search: at the start, its factors after a step that helps and one that does not, and its
+/// bounds.
 const DAMPING: f64 = 1e-3;
 const EASED: f64 = 0.1;
 const STIFFENED: f64 = 20.0;
@@ -29,7 +30,8 @@ const CONVERGED: f64 = 0.05;
 /// Deviations below which the tail of a Gaussian is taken by Mills' ratio.
 const MILLS: f64 = -6.0;
 
-/// One hypothesis at the mode of its posterior, with Laplace's approximation about it, at one share of form uncertainty.
+/// One hypothesis at the mode of its posterior, with Laplace's approximation about it, at one share of form
+/// uncertainty.
 #[derive(Clone)]
 pub struct Posterior {
     /// Members and their laws.
@@ -92,7 +94,7 @@ pub fn laplace(
     let build = |change: &Change| problem.covariance(&change.columns(basis, freedom.share));
     let penalty = |u: &[f64]| -> f64 { u.iter().zip(&precision).map(|(x, p)| p * x * x).sum() };
     let mut covariance = build(&change);
-    let mut cost = covariance.quadratic(&(&y - &m)) + covariance.log_det() + penalty(&u);
+    let mut cost = covariance.quadratic(&(&y - &m)) + covariance.log_det + penalty(&u);
     let mut damping = DAMPING;
     let mut jacobian = problem.jacobian(members, &u, &m);
     // Whether the Jacobian is that of this place; every second one is carried along with the step.
@@ -105,7 +107,7 @@ pub fn laplace(
             let there = problem.predict(members, &next);
             let moved = Change::by(problem, members, &next, &there, basis, freedom);
             let trial = build(&moved);
-            let value = trial.quadratic(&(&y - &there)) + trial.log_det() + penalty(&next);
+            let value = trial.quadratic(&(&y - &there)) + trial.log_det + penalty(&next);
             if value < cost {
                 gained = cost - value;
                 carry(&mut jacobian, &u, &next, &(&there - &m));
@@ -129,8 +131,9 @@ pub fn laplace(
     }
     let residual = &y - &m;
     let (mut hessian, gradient) = equations(&covariance, &jacobian, &residual, &precision, &u);
-    // A uniform prior bounds the integral where the data say nothing: a Gaussian of its own variance stands for it. Without,
-    // a shape that nothing depends on (an exponent, at size zero) would count with an endless volume.
+    // A uniform prior bounds the integral where the data say nothing: a Gaussian of its own variance stands
+    // for it. Without, a shape that nothing depends on (an exponent, at size zero) would count with an
+    // endless volume.
     let parameters = members.iter().flat_map(|member| member.parameters(&problem.design));
     for (k, parameter) in parameters.enumerate().map(|(k, p)| (k + NUISANCES, p)) {
         if let Prior::Uniform(..) = parameter.prior {
@@ -139,8 +142,7 @@ pub fn laplace(
     }
     let log_2pi = 1.837_877_066_409_345_3;
     let d = u.len() as f64;
-    let mut log_evidence = -0.5
-        * (covariance.quadratic(&residual) + covariance.log_det() + n as f64 * log_2pi)
+    let mut log_evidence = -0.5 * (covariance.quadratic(&residual) + covariance.log_det + n as f64 * log_2pi)
         + problem.log_prior(members, &u)
         + 0.5 * d * log_2pi;
     let posterior = match hessian.clone().cholesky() {

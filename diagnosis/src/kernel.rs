@@ -61,18 +61,14 @@ pub(crate) const COUNT: usize = SMOOTH.len();
 const OF_ITS_OWN: f64 = 0.5;
 
 impl Coordinates {
-    /// Mean and deviation of each covariate over the table. One that some passes lack is left out, and weather
-    /// that is time by another name.
+    /// Mean and deviation of each covariate over the table. One that some passes lack is left out, and
+    /// weather that is time by another name.
     pub fn of(table: &Table) -> Self {
         Self::from(table, OF_ITS_OWN)
     }
 
-    /// The same with all weather that changes, for functions that do not go over time.
-    pub fn with_weather(table: &Table) -> Self {
-        Self::from(table, 0.0)
-    }
-
-    fn from(table: &Table, of_its_own: f64) -> Self {
+    /// The same; with a share of zero all weather that changes, for functions that do not go over time.
+    pub fn from(table: &Table, of_its_own: f64) -> Self {
         let n = table.len() as f64;
         let largest_amplitude = table.design.largest_amplitude_m;
         let (mut mean, mut sd) = ([0.0; COUNT], [0.0; COUNT]);

@@ -59,15 +59,6 @@ struct Look {
     places: Option<Vec<f64>>,
 }
 
-impl Look {
-    fn score(&self, values: &[f64], sums: &mut Vec<f64>) -> f64 {
-        match &self.places {
-            None => strongest_window(self.order.iter().map(|&i| values[i]), sums),
-            Some(places) => strongest_period(self.order.iter().map(|&i| values[i]), places),
-        }
-    }
-}
-
 /// Largest sum over a window of passes, over its deviation.
 fn strongest_window(values: impl Iterator<Item = f64>, sums: &mut Vec<f64>) -> f64 {
     sums.clear();
@@ -125,7 +116,8 @@ fn looks(problem: &Problem) -> Vec<Look> {
     list
 }
 
-/// The strongest structure in what a model leaves, after what passes have in common; none of a table too short to shuffle.
+/// The strongest structure in what a model leaves, after what passes have in common; none of a table too
+/// short to shuffle.
 pub fn structure(problem: &Problem, model: &Posterior) -> Option<Structure> {
     let n = problem.len();
     let looks = looks(problem);
@@ -143,7 +135,11 @@ pub fn structure(problem: &Problem, model: &Posterior) -> Option<Structure> {
         for look in &looks {
             for values in &signals {
                 moved.iter_mut().zip(order).for_each(|(m, &i)| *m = values[i] * signs[i]);
-                row.push(look.score(&moved, &mut sums));
+                let values = look.order.iter().map(|&i| moved[i]);
+                row.push(match &look.places {
+                    None => strongest_window(values, &mut sums),
+                    Some(places) => strongest_period(values, places),
+                });
             }
         }
         row
@@ -158,8 +154,9 @@ pub fn structure(problem: &Problem, model: &Posterior) -> Option<Structure> {
     Some(Structure { place: words, p: tail.clamp(f64::MIN_POSITIVE, 1.0) })
 }
 
-/// What each pass brings beside those before it, in its deviations: passes that have scatter in common are no structure, but a step
-/// that outlasts what they have in common is. Of long tables what is in common is taken out as a whole instead.
+/// What each pass brings beside those before it, in its deviations: passes that have scatter in common are no
+/// structure, but a step that outlasts what they have in common is. Of long tables what is in common is taken
+/// out as a whole instead.
 fn innovations(problem: &Problem, model: &Posterior) -> Vec<f64> {
     let n = problem.len();
     let residual = DVector::from_column_slice(&problem.lateral) - &model.prediction;

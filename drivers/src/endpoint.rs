@@ -28,8 +28,9 @@ use view::View;
 /// some ten times a second.
 const ALARM_HOLDS: Nanos = Nanos(1_500_000_000);
 
-/// A plate that is seen to vibrate by more than this, peak-to-peak in m, is not off, whatever its amplifier says of its
-/// output: ten times what the plate sensors of the bundled profiles are uncertain by, and a tenth of what reduces friction.
+/// A plate that is seen to vibrate by more than this, peak-to-peak in m, is not off, whatever its amplifier
+/// says of its output: ten times what the plate sensors of the bundled profiles are uncertain by, and a tenth
+/// of what reduces friction.
 const OFF_AMPLITUDE_PP_M: f64 = 0.1e-6;
 /// A stage that is seen to move slower than this, in m/s, stands: the slowest sweep slides ten times faster.
 const AT_REST_M_S: f64 = 0.5e-3;
@@ -384,12 +385,8 @@ impl Endpoint {
                 Step::New { lost } => {
                     health.lost_samples.fetch_add(lost, std::sync::atomic::Ordering::Relaxed);
                 }
-                Step::Same => {
-                    health.count(&health.repeats);
-                    return None;
-                }
-                Step::Old => {
-                    health.count(&health.out_of_order);
+                old @ (Step::Same | Step::Old) => {
+                    health.count(if old == Step::Same { &health.repeats } else { &health.out_of_order });
                     return None;
                 }
                 Step::Reset => health.count(&health.clock_resets),

@@ -1,4 +1,5 @@
-//! The element kernel on one core: beside its twin in C, in turn, and beside the bound of its own instructions.
+//! The element kernel on one core: beside its twin in C, in turn, and beside the bound of its own
+//! instructions.
 //!
 //! `cargo bench -p muprime-models --bench ridge_kernel`: about 1500 elements, contact included, CPU seconds
 //! of the thread; wants `cc` for the twin and `objdump` for the bound. `-- lanes`: eight cases side by side
@@ -63,7 +64,7 @@ impl Ridge {
         let mut body = Body::new(mesh.clone(), strain);
         body.hold_top();
         let plate = Plate::new(vec![93e6; mesh.nx], FrictionRule::Global, 0.5).expect("valid");
-        let dt = stability::stable_step_s(stability::highest_frequency_rad_s(&body, plate.penalty()));
+        let dt = stability::stable_step_s(stability::highest_frequency_rad_s(&body, &plate.penalty));
         Ridge { body, plate, dt, mesh }
     }
 
@@ -100,7 +101,7 @@ impl Ridge {
                 frequency_hz: 27.5e3,
                 speed_m_s: 0.02,
                 mu0: 0.5,
-                penalty: self.plate.penalty().to_vec(),
+                penalty: self.plate.penalty.clone(),
                 material: self.mesh.row_material.iter().map(softer).collect(),
             }
         };
@@ -158,7 +159,8 @@ fn in_turn(instructions: Instructions, name: &str, strain: Strain) {
     }
 }
 
-/// Eight cases in the lanes of a vector, and single precision, against one case along its rows: all in the twin, in turn.
+/// Eight cases in the lanes of a vector, and single precision, against one case along its rows: all in the
+/// twin, in turn.
 fn lanes() {
     let avx512 = Instructions::Avx512.here();
     for elements in [200, 400, 800] {

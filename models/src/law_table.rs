@@ -278,11 +278,6 @@ impl LawTable {
         Ok(LawTable { axes, values })
     }
 
-    /// Number of rows.
-    pub fn rows(&self) -> usize {
-        self.values.len()
-    }
-
     /// mu' and its standard uncertainty. Allocates nothing.
     ///
     /// # Errors

@@ -56,7 +56,8 @@ pub trait FrictionModel: Send + Sync {
     /// A condition outside the domain of the law, by name.
     fn predict(&self, condition: &Condition) -> Result<Prediction, OutOfDomain>;
 
-    /// The same without force and regime. A law that must solve something else for its regime says less here, and sooner.
+    /// The same without force and regime. A law that must solve something else for its regime says less here,
+    /// and sooner.
     ///
     /// # Errors
     /// As [`FrictionModel::predict`].
@@ -176,11 +177,6 @@ impl SpringSlider {
         finger.check()?;
         Ok(SpringSlider { finger })
     }
-
-    /// The finger it was made for.
-    pub fn finger(&self) -> &Finger {
-        &self.finger
-    }
 }
 
 impl FrictionModel for SpringSlider {
@@ -224,7 +220,8 @@ impl FrictionModel for SpringSlider {
     }
 }
 
-/// The empirical law of Eq. 20 with the paper's fit, under both readings of its `w`: a mixture, until data decide.
+/// The empirical law of Eq. 20 with the paper's fit, under both readings of its `w`: a mixture, until data
+/// decide.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct EmpiricalPsi {
     finger: Finger,

@@ -17,7 +17,8 @@ use crate::finger::Finger;
 use crate::prediction::{FrictionModel, Prediction, Regime, Validity};
 use crate::quantity::PeakToPeak;
 
-/// The text of the table that ships with the project, as [`Surrogate::shipped`] reads it: what its hash is taken of.
+/// The text of the table that ships with the project, as [`Surrogate::shipped`] reads it: what its hash is
+/// taken of.
 pub const DEFAULT_TABLE: &str = include_str!("../data/ridge_table.txt");
 
 /// Error of the interpolation against the finite element model on held-out cases.
@@ -51,7 +52,8 @@ pub struct SurrogatePoint {
 /// The interpolated table.
 #[derive(Clone, Debug)]
 pub struct Surrogate {
-    grid: Grid,
+    /// The axes of the table.
+    pub grid: Grid,
     /// Refined once with monotone cubics along every axis, then read linearly.
     mu: spline::Dense,
     phase: spline::Dense,
@@ -83,11 +85,6 @@ impl Surrogate {
         self.with_young_modulus_pa(young_modulus_pa)
     }
 
-    /// The axes of the table.
-    pub fn grid(&self) -> &Grid {
-        &self.grid
-    }
-
     /// Friction and phase at amplitude, frequency, speed over mu_0, force and modulus. Allocates nothing.
     #[inline]
     pub fn at(
@@ -113,7 +110,8 @@ impl Surrogate {
         let phase = self.phase.at([e, force, f, 0.0, column]);
         let mut contact = self.contact.at([e, force, f, 0.0, column]);
         if w < first {
-            // Below the first amplitude friction and contact fall from one linearly: the force's ripple grows so.
+            // Below the first amplitude friction and contact fall from one linearly: the force's ripple grows
+            // so.
             let share = w / first;
             mu = 1.0 - share * (1.0 - mu);
             contact = 1.0 - share * (1.0 - contact);

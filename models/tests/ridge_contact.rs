@@ -29,7 +29,7 @@ fn bouncing_bar() {
             body.set_load(n, 0.0, -10.0 * body.mass_kg_m(n));
         }
     }
-    let dt = stability::contact_step_s(&body, plate.penalty());
+    let dt = stability::contact_step_s(&body, &plate.penalty);
     let dt = 0.7 * dt;
     let (mut t, mut touching, mut touches, mut leaves) = (0.0, false, Vec::new(), Vec::new());
     let mut quiet = 0.0;
@@ -73,12 +73,12 @@ fn contact_patch_is_uniform() {
     for (i, w) in width.iter().enumerate() {
         body.set_load(body.node(i, 8), 0.0, -1e4 * w);
     }
-    let dt = stability::contact_step_s(&body, plate.penalty());
+    let dt = stability::contact_step_s(&body, &plate.penalty);
     body.advance(dt, 30.0, 60_000, &mut |mut s| {
         plate.touch(&mut s, 0.0, 0.0);
     });
     for (i, w) in width.iter().enumerate() {
-        let pressure = plate.node_load()[i] / w;
+        let pressure = plate.load[i] / w;
         assert!((pressure / 1e4 - 1.0).abs() < 0.01, "node {i}: {pressure} Pa");
     }
     // Free sides: the block shortens by p L (1 - nu^2) / E in plane strain.
@@ -120,16 +120,15 @@ fn hertz_pressure_under_the_tip() {
             body.set_load(body.node(i, row), 0.0, -load * w / 500e-6);
         }
         // Nothing holds the block but the plate.
-        let dt = stability::contact_step_s(&body, plate.penalty());
+        let dt = stability::contact_step_s(&body, &plate.penalty);
         body.advance(dt, 4e5, (120e-6 / dt) as usize, &mut |mut s| {
             plate.touch(&mut s, 0.0, 0.0);
         });
-        let total: f64 = plate.node_load().iter().sum();
-        let pressure: Vec<f64> = plate.node_load().iter().zip(&width).map(|(f, w)| f / w).collect();
+        let total: f64 = plate.load.iter().sum();
+        let pressure: Vec<f64> = plate.load.iter().zip(&width).map(|(f, w)| f / w).collect();
         let peak = pressure.iter().fold(0.0_f64, |a, p| a.max(*p));
         // Half-width from the second moment of the pressure, b^2/4 for Hertz's half ellipse.
-        let moment: f64 =
-            plate.node_load().iter().enumerate().map(|(i, f)| f * body.position_m(i).0.powi(2)).sum();
+        let moment: f64 = plate.load.iter().enumerate().map(|(i, f)| f * body.position_m(i).0.powi(2)).sum();
         let half = 2.0 * (moment / total).sqrt();
         println!(
             "{elements}: load {total:.4} N/m, peak {:.1} kPa (Hertz {:.1}), half-width {:.3} um (Hertz {:.3})",
@@ -164,7 +163,7 @@ fn coulomb_block_slides_stops_and_sticks() {
                 }
             }
             let plate = Plate::new(penalty, rule, mu).expect("valid");
-            let dt = stability::contact_step_s(&body, plate.penalty());
+            let dt = stability::contact_step_s(&body, &plate.penalty);
             (body, plate, dt)
         };
         let run = |pull: f64, start: f64, time: f64| {

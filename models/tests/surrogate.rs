@@ -9,7 +9,7 @@ use muprime_models::surrogate::{Grid, Surrogate, TableError};
 #[test]
 fn the_shipped_table_belongs_to_this_model() {
     let surrogate = Surrogate::shipped().expect("reads");
-    assert_eq!(*surrogate.grid(), Grid::SHIPPED);
+    assert_eq!(surrogate.grid, Grid::SHIPPED);
     assert_eq!(
         surrogate.inputs_hash,
         Grid::SHIPPED.inputs_hash(),

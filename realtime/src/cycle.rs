@@ -8,7 +8,7 @@
 use crate::estimate::{EstimateConfig, Mu0, MuRelative, NoMu, Window};
 use crate::ports::Nanos;
 use crate::render::{Render, Rendered};
-use crate::safety::{Controls, Decision, Exposed, Limits, Observation, Request, Safety, State};
+use crate::safety::{Controls, Decision, Exposed, Limits, Observation, Request, Safety};
 use models::condition::{Ambient, Condition};
 use models::prediction::FrictionModel;
 use models::quantity::{Direction, PeakToPeak};
@@ -100,19 +100,6 @@ pub struct CycleState {
 }
 
 impl CycleState {
-    /// Safety's state.
-    pub const fn safety(&self) -> State {
-        self.safety.state()
-    }
-
-    /// Before the first cycle: what earlier runs did is carried over. A key that was not heard yet may be
-    /// held all the same: it is released when it has not been heard for its age.
-    fn begin(&mut self, config: &Config, now: Nanos) {
-        self.begun = true;
-        self.key_held_at = Some(now);
-        self.safety.carry(&config.exposed);
-    }
-
     /// Time that the plate was driven in this run, and the squared rms velocity summed over it, in m2/s.
     pub const fn exposure(&self) -> (Nanos, f64) {
         self.safety.exposure()
@@ -183,7 +170,10 @@ pub fn step(
 /// The first half of a cycle: commands and safety. What it decides is ready to leave.
 pub fn decide(config: &Config, state: &mut CycleState, inputs: &Inputs, now: Nanos) -> Decision {
     if !state.begun {
-        state.begin(config, now);
+        // What earlier runs did is carried over. A key that was not heard yet may be held all the same: it is
+        // released when it has not been heard for its age.
+        (state.begun, state.key_held_at) = (true, Some(now));
+        state.safety.carry(&config.exposed);
     }
     let controls = take_commands(state, inputs, now);
     state.safety.step(&config.limits, &inputs.seen, &state.request, controls, now)

@@ -7,8 +7,7 @@
 #![deny(clippy::disallowed_types, clippy::disallowed_methods)]
 
 use crate::ports::{
-    Amplifier, AmplifierState, Channel, ForceSensor, Forces, Nanos, NoData, Quality, Sample, Stage,
-    StageState,
+    Amplifier, AmplifierState, ForceSensor, Forces, Nanos, NoData, Quality, Sample, Stage, StageState,
 };
 use crate::safety::{DriveCommand, StageCommand};
 use serde::{Deserialize, Serialize};
@@ -111,6 +110,11 @@ pub struct Fault {
 impl Fault {
     const fn acts(&self, now: Nanos) -> bool {
         now.0 >= self.from.0 && now.0 < self.until.0
+    }
+
+    /// Whether this is the one in `strength` that it counts.
+    fn counts(&self, count: u64) -> bool {
+        count.is_multiple_of(self.strength.max(1.0) as u64)
     }
 }
 
@@ -255,13 +259,9 @@ struct Line<S: Sampled> {
 
 impl<S: Sampled> Line<S> {
     fn new(target: [Target; 2], faults: &[Fault], seed: u64) -> Self {
-        let mut mine_only = [None; FAULTS];
-        let mine = faults.iter().filter(|f| target.contains(&f.target));
-        for (slot, fault) in mine_only.iter_mut().zip(mine) {
-            *slot = Some(*fault);
-        }
+        let mut mine = faults.iter().filter(|f| target.contains(&f.target)).copied();
         Line {
-            faults: mine_only,
+            faults: std::array::from_fn(|_| mine.next()),
             dice: Dice(seed ^ ((target[0] as u64) << 56)),
             seen: [None; LINE],
             newest: 0,
@@ -314,16 +314,21 @@ impl<S: Sampled> Line<S> {
         out
     }
 
-    /// What the loop is shown when nothing new came through.
-    fn nothing_new(&self) -> Result<S, NoData> {
-        self.shown.ok_or(NoData::NeverRead)
-    }
-
     /// Whether the fault changed what the loop sees in this cycle.
     fn apply(&mut self, fault: &Fault, fresh: bool, out: &mut Result<S, NoData>, now: Nanos) -> bool {
+        if fault.mode.strikes_samples() && !fresh {
+            return false;
+        }
         match fault.mode {
             FaultMode::Ok => return false,
-            FaultMode::Off => *out = self.nothing_new(),
+            FaultMode::Slow if fault.counts(self.count) => return false,
+            FaultMode::Intermittent if self.dice.unit() >= fault.strength => return false,
+            FaultMode::Spikes if self.spiked && !fault.counts(self.count) => return false,
+            FaultMode::Disordered if self.count.is_multiple_of(2) => return false,
+            // Nothing new comes through: the loop is shown what it was shown last.
+            FaultMode::Off | FaultMode::Slow | FaultMode::Intermittent => {
+                *out = self.shown.ok_or(NoData::NeverRead);
+            }
             FaultMode::Stuck => {
                 let held = *self.held.get_or_insert(match *out {
                     Ok(sample) => sample,
@@ -333,40 +338,19 @@ impl<S: Sampled> Line<S> {
             }
             FaultMode::Garbage => out.iter_mut().for_each(|sample| sample.spoil(&mut self.dice)),
             FaultMode::Wrong => out.iter_mut().for_each(|sample| sample.scale(fault.strength)),
-            FaultMode::Slow => {
-                if !fresh || self.count.is_multiple_of((fault.strength.max(1.0)) as u64) {
-                    return false;
-                }
-                *out = self.nothing_new();
-            }
             FaultMode::Delayed => {
                 let then = now.0.checked_sub((fault.strength * 1e9) as u64).map(Nanos);
                 *out = then.and_then(|then| self.arrived_by(then)).ok_or(NoData::NeverRead);
-            }
-            FaultMode::Intermittent => {
-                if !fresh || self.dice.unit() >= fault.strength {
-                    return false;
-                }
-                *out = self.nothing_new();
             }
             FaultMode::Invalid => *out = Err(NoData::Invalid),
             FaultMode::Corrupt => *out = Err(NoData::Corrupt),
             FaultMode::Disconnected => *out = Err(NoData::Disconnected),
             FaultMode::Spikes => {
-                let due = self.count.is_multiple_of((fault.strength.max(1.0)) as u64);
-                if !fresh || (self.spiked && !due) {
-                    return false;
-                }
                 self.spiked = true;
                 out.iter_mut().for_each(|sample| sample.scale(100.0));
             }
             FaultMode::Saturated => out.iter_mut().for_each(Sampled::saturate),
-            FaultMode::Disordered => {
-                if !fresh || self.count.is_multiple_of(2) {
-                    return false;
-                }
-                *out = self.back(3).ok_or(NoData::NeverRead);
-            }
+            FaultMode::Disordered => *out = self.back(3).ok_or(NoData::NeverRead),
             FaultMode::ClockJump => out.iter_mut().for_each(|sample| sample.move_clock(fault.strength)),
         }
         true
@@ -392,8 +376,7 @@ impl<P: ForceSensor> FaultyForce<P> {
 impl<P: ForceSensor> ForceSensor for FaultyForce<P> {
     fn read(&mut self, now: Nanos) -> Forces {
         let came = self.inner.read(now);
-        let pass = |line: &mut Line<Sample>, channel: Channel| line.pass(channel, now);
-        Forces { lateral: pass(&mut self.lateral, came.lateral), normal: pass(&mut self.normal, came.normal) }
+        Forces { lateral: self.lateral.pass(came.lateral, now), normal: self.normal.pass(came.normal, now) }
     }
 }
 
@@ -444,7 +427,7 @@ impl<P: Amplifier> Amplifier for FaultyAmplifier<P> {
             match fault.mode {
                 FaultMode::Off | FaultMode::Disconnected | FaultMode::Corrupt => return,
                 FaultMode::Intermittent if self.dice.unit() < fault.strength => return,
-                FaultMode::Slow if !self.commands.is_multiple_of((fault.strength.max(1.0)) as u64) => return,
+                FaultMode::Slow if !fault.counts(self.commands) => return,
                 FaultMode::Delayed => {
                     self.under_way[self.next] =
                         Some((now.plus(Nanos::from_seconds(fault.strength)), command));
@@ -459,8 +442,7 @@ impl<P: Amplifier> Amplifier for FaultyAmplifier<P> {
 
     fn state(&mut self, now: Nanos) -> Result<AmplifierState, NoData> {
         self.deliver(now);
-        let came = self.inner.state(now);
-        self.states.pass(came, now)
+        self.states.pass(self.inner.state(now), now)
     }
 }
 
@@ -483,8 +465,7 @@ impl<P: Stage> Stage for FaultyStage<P> {
     }
 
     fn state(&mut self, now: Nanos) -> Result<StageState, NoData> {
-        let came = self.inner.state(now);
-        self.states.pass(came, now)
+        self.states.pass(self.inner.state(now), now)
     }
 }
 

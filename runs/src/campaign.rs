@@ -154,15 +154,16 @@ impl Campaign {
             wrong.add(&["margin"], problem, None);
         }
         let mut names = BTreeSet::new();
-        for Cell { name, .. } in &file.cell {
+        for (index, Cell { name, .. }) in file.cell.iter().enumerate() {
+            let place = input::place_in(text, "cell", index, "name");
             let plain = |c: char| c.is_ascii_alphanumeric() || c == '-' || c == '_';
             if name.is_empty() || !name.chars().all(plain) {
                 let problem =
                     format!("a cell's name '{name}' has other characters than letters, digits, - and _");
-                wrong.add(&["cell"], problem, None);
+                wrong.add_at(place.clone(), problem, None);
             }
             if !names.insert(name) {
-                wrong.add(&["cell"], format!("two cells are named '{name}'"), None);
+                wrong.add_at(place, format!("two cells are named '{name}'"), None);
             }
         }
         wrong.end()?;
@@ -267,4 +268,21 @@ pub fn sessions(file: &CampaignFile) -> Vec<CampaignRun> {
 pub fn is_complete(run: &Path) -> bool {
     crate::job::Summary::written_in(run)
         .is_some_and(|summary| summary.outcome == crate::sequence::Outcome::Complete)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// The first cell's line was shown, whichever it was.
+    #[test]
+    fn a_cell_whose_name_is_wrong_is_shown_at_its_own_line() {
+        let cell = |name: &str| format!("[[cell]]\nname = \"{name}\"\nsetup = \"virtual\"\n");
+        for wrong in ["b/c", "a"] {
+            let text =
+                format!("name = \"c\"\nplan = \"first-sweep\"\nblocks = 1\n{}{}", cell("a"), cell(wrong));
+            let why = Campaign::parse("c", &text, Path::new(".")).err().unwrap();
+            assert!(format!("{why:?}").contains("c:8:8"), "{why:?}");
+        }
+    }
 }

@@ -391,6 +391,13 @@ pub fn place_of(text: &str, path: &[&str]) -> Option<Range<usize>> {
     here.get(*last).map(Spanned::span)
 }
 
+/// The place of a key's value in an entry of a list of tables, from 0.
+pub(crate) fn place_in(text: &str, list: &str, index: usize, name: &str) -> Option<Range<usize>> {
+    let table = DeTable::parse(text).ok()?;
+    let entries = table.get_ref().get(list)?.get_ref().as_array()?;
+    entries.get(index)?.get_ref().as_table()?.get(name).map(Spanned::span)
+}
+
 #[cfg(test)]
 mod tests {
     use super::{Problems, in_si, parse_toml, unit_meant};

@@ -15,7 +15,7 @@ pub use telemetry::{Deadlines, Extremes, LATENESS_BOUNDS_S, Snapshot, Snapshots}
 use crate::ambient::{Answers, LevelsFound};
 use crate::fidelity::Stated;
 use crate::fidelity::dynamics::Dynamics;
-use crate::plan::{Plan, Point, Resolution};
+use crate::plan::{Plan, Point, Resolution, lateral_reach};
 use crate::print::quoted;
 use crate::run_dir::{Identity, RunDir, SUMMARY};
 use crate::sequence::{Event, MeasuredPass, Outcome, PAUSE_MAX_S, Sequence, Zeros};
@@ -300,7 +300,9 @@ impl Job {
         let resolution = self.resolution()?;
         let points = self.plan.points(self.seed, &self.setup.config.limits, &resolution)?;
         self.plan.check_ambient(&self.setup)?;
-        self.plan.check_reach(&self.setup.reaches()?)?;
+        let (mut reaches, most_n) = (self.setup.reaches()?, self.setup.config.limits.lateral_force_max_n);
+        reaches.extend(lateral_reach(&points, self.setup.tip.mu0, most_n));
+        self.plan.check_reach(&reaches)?;
         if let Some(mut channel) = self.setup.lateral_channel() {
             channel.noise_n = noise_n.or(channel.noise_n);
             let mu0 = self.setup.tip.mu0;

@@ -28,7 +28,7 @@ use std::path::PathBuf;
 
 pub(crate) use points::series_place;
 pub use points::{Point, Resolution};
-pub use reach::{Reach, times};
+pub use reach::{Reach, lateral_reach, times};
 pub use render::{Control, RenderPlan, TargetKind};
 pub(crate) use steps::SKIN_MOISTURE;
 pub use steps::{Action, Step, When};
@@ -298,6 +298,12 @@ impl Plan {
             wrong.add(&["directions"], "directions are 1, -1 or both", remedy());
         }
         for (index, series) in file.series.iter().enumerate() {
+            let unnamed = |s: &Series| Series { name: String::new(), ..s.clone() };
+            if file.series[..index].iter().any(|before| unnamed(before) == unnamed(series)) {
+                let place = series.lists().iter().find_map(|(c, _)| series_place(text, index, c.name));
+                let remedy = "delete one of the two; `replicates` repeats every condition";
+                wrong.add_at(place, "two series are the same", remedy.to_string());
+            }
             if unknown(&series.directions) {
                 let place = points::series_place(text, index, "directions");
                 wrong.add_at(place, "directions are 1, -1 or both", remedy());

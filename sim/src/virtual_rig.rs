@@ -53,7 +53,7 @@ fn reading(sample: &ForceSample, axis: usize, unstated: Nanos) -> Channel {
 impl ForceSensor for VirtualRig {
     fn read(&mut self, now: Nanos) -> Forces {
         self.world.advance_to(now);
-        let unstated = Nanos::from_seconds(self.world.config().sensor.unstated_latency_s);
+        let unstated = Nanos::from_seconds(self.world.config.sensor.unstated_latency_s);
         let Some(sample) = self.world.force_sample() else { return Forces::missing(NoData::NeverRead) };
         Forces { lateral: reading(&sample, 0, unstated), normal: reading(&sample, 1, unstated) }
     }

@@ -69,7 +69,8 @@ const MARCH_STEPS: usize = 400;
 
 /// The virtual rig's world.
 pub struct World {
-    config: WorldConfig,
+    /// What it was built from, set-up defects included.
+    pub config: WorldConfig,
     now: Nanos,
     tick_s: f64,
     ticks: u64,
@@ -93,7 +94,8 @@ pub struct World {
     strokes: u64,
     pass_factor: f64,
     contact_time_s: f64,
-    truth: Truth,
+    /// What is true now: for scoring only.
+    pub truth: Truth,
     /// Dead weights that hang on the force sensor: true forces from the next tick on (N).
     pub hung: Forces,
     known_pp_m: f64,
@@ -153,11 +155,6 @@ impl World {
     /// The world's time.
     pub fn now(&self) -> Nanos {
         self.now
-    }
-
-    /// What it was built from, set-up defects included.
-    pub fn config(&self) -> &WorldConfig {
-        &self.config
     }
 
     /// Steps to a time; a time already reached changes nothing.
@@ -238,8 +235,9 @@ impl World {
         if let Some(ridge) = &self.ridge {
             return (pp, ridge.steady(&contact));
         }
-        // Only mass and late recovery carry anything from one cycle to the next; the march knows them for one ridge on a
-        // plain sine. Every other contact is periodic from its first cycle: its steady state is its every cycle.
+        // Only mass and late recovery carry anything from one cycle to the next; the march knows them for one
+        // ridge on a plain sine. Every other contact is periodic from its first cycle: its steady state is
+        // its every cycle.
         let remembers = contact.has_inertia() || contact.recovery != Recovery::Instant;
         let plain = contact.motion == Motion::default() && contact.ridge.height_sd_m == 0.0;
         let steady = if self.config.contact == ContactMode::Averaged {
@@ -295,7 +293,8 @@ impl World {
         }
     }
 
-    /// What a vibrometer beside the finger sees: the true motion of the free plate at the stage's place, peak-to-peak (m).
+    /// What a vibrometer beside the finger sees: the true motion of the free plate at the stage's place,
+    /// peak-to-peak (m).
     pub fn free_amplitude_pp_m(&self) -> f64 {
         let at = Surroundings {
             time_s: self.now.seconds(),
@@ -308,11 +307,6 @@ impl World {
             temperature_c: self.room.of(Air::Temperature),
         };
         self.config.defects.plate(&at, self.known_pp_m)
-    }
-
-    /// What is true now: for scoring only.
-    pub fn truth(&self) -> Truth {
-        self.truth
     }
 
     /// The fingertip's true properties: for scoring only.

@@ -33,13 +33,13 @@ fn an_amplifier_that_refuses_off_is_stopped_by_its_supply() {
     for ms in 50..90 {
         drive(&mut world, ms, false);
     }
-    assert!(world.truth().amplitude_pp_m > 1.9e-6);
+    assert!(world.truth.amplitude_pp_m > 1.9e-6);
     world.amplifier.cut_supply();
     // Ring-down: under 5 % within three time constants of Q / (pi f) = 1.74 ms.
     for ms in 90..96 {
         drive(&mut world, ms, false);
     }
-    assert!(world.truth().amplitude_pp_m < 0.05 * 2e-6, "{:?}", world.truth());
+    assert!(world.truth.amplitude_pp_m < 0.05 * 2e-6, "{:?}", world.truth);
     let status = world.amplifier_status().unwrap();
     assert!(!status.output_on && !status.supply_closed);
 }
@@ -50,10 +50,10 @@ fn a_controller_that_dies_is_noticed_by_the_amplifier_itself() {
     for ms in 0..50 {
         drive(&mut world, ms, true);
     }
-    assert!(world.truth().amplitude_pp_m > 1.9e-6);
+    assert!(world.truth.amplitude_pp_m > 1.9e-6);
     // Nothing is commanded any more; the watchdog's 50 ms and three time constants later the plate is still.
     world.advance_to(Nanos(107_000_000));
-    assert!(world.truth().amplitude_pp_m < 0.05 * 2e-6);
+    assert!(world.truth.amplitude_pp_m < 0.05 * 2e-6);
     assert!(world.amplifier_status().unwrap().watchdog_tripped);
 }
 
@@ -64,7 +64,7 @@ fn a_link_that_is_off_lets_no_command_through() {
         drive(&mut world, ms, true);
     }
     // Commands went on, yet none arrived: the watchdog has switched off.
-    assert_eq!(world.truth().amplitude_pp_m, 0.0);
+    assert_eq!(world.truth.amplitude_pp_m, 0.0);
     assert!(world.amplifier_status().unwrap().taken_at < Nanos(30_000_000), "the last state is from before");
 }
 
@@ -74,7 +74,7 @@ fn a_stalled_stage_stands_still() {
     for ms in 0..400 {
         drive(&mut world, ms, true);
     }
-    let truth = world.truth();
+    let truth = world.truth;
     assert!(truth.velocity_m_s == 0.0 && (truth.position_m - 0.004).abs() < 2e-4, "{truth:?}");
     assert!(world.stage_status().unwrap().velocity_m_s == 0.0);
 }

@@ -5,10 +5,20 @@ use miette::IntoDiagnostic;
 use runs::leave::leave_now;
 use runs::say;
 use std::io::IsTerminal;
-use std::sync::{Arc, Mutex, PoisonError};
+use std::sync::atomic::AtomicBool;
+use std::sync::{Arc, Mutex, Once, PoisonError};
 
 /// Status of what Ctrl-C ended: 128 and the number of the signal.
 pub const INTERRUPTED: u8 = 130;
+
+/// Whether a command answers with documents: what there is on Ctrl-C is one too.
+pub static JSON: AtomicBool = AtomicBool::new(false);
+
+/// What says what there is so far of the part at work; it gets the bar's position.
+type Partial = (ProgressBar, Box<dyn FnOnce(u64) + Send>);
+
+/// That of the part that began last: a command may have several.
+static AT_WORK: Mutex<Option<Partial>> = Mutex::new(None);
 
 /// A bar on standard error with the time that is left, hidden where that is not a terminal: a log holds no
 /// bars.
@@ -27,27 +37,34 @@ pub fn bar(length: u64, what: &str) -> ProgressBar {
 }
 
 /// On Ctrl-C the bar goes, `partial` says what there is so far (it gets the bar's position), and the program
-/// ends with [`INTERRUPTED`]. A second Ctrl-C waits for nothing.
+/// ends with [`INTERRUPTED`]. A second Ctrl-C waits for nothing. A later call takes the place of this one.
 ///
 /// # Errors
 /// As [`on_signals`].
 pub fn on_interrupt(bar: &ProgressBar, partial: impl FnOnce(u64) + Send + 'static) -> miette::Result<()> {
-    let bar = bar.clone();
-    let mut partial = Some(partial);
-    on_signals(&[signal_hook::consts::SIGINT], move || {
-        let Some(partial) = partial.take() else { return leave_now(INTERRUPTED) };
-        let position = bar.position();
-        bar.finish_and_clear();
-        say!("stopped by Ctrl-C: what follows is partial");
-        // Printing it may take long, or fail: the next Ctrl-C does not wait for it.
-        let thread = std::thread::Builder::new().name("partial".into()).spawn(move || {
-            partial(position);
-            leave_now(INTERRUPTED);
-        });
-        if thread.is_err() {
-            leave_now(INTERRUPTED);
-        }
-    })
+    static WATCHED: Once = Once::new();
+    *AT_WORK.lock().unwrap_or_else(PoisonError::into_inner) = Some((bar.clone(), Box::new(partial)));
+    let (mut watching, mut is_first) = (Ok(()), true);
+    WATCHED.call_once(|| {
+        watching = on_signals(&[signal_hook::consts::SIGINT], move || {
+            let at_work = AT_WORK.lock().unwrap_or_else(PoisonError::into_inner).take();
+            let Some((bar, partial)) = at_work.filter(|_| std::mem::take(&mut is_first)) else {
+                return leave_now(INTERRUPTED);
+            };
+            let position = bar.position();
+            bar.finish_and_clear();
+            say!("stopped by Ctrl-C: what follows is partial");
+            // Printing it may take long, or fail: the next Ctrl-C does not wait for it.
+            let thread = std::thread::Builder::new().name("partial".into()).spawn(move || {
+                partial(position);
+                leave_now(INTERRUPTED);
+            });
+            if thread.is_err() {
+                leave_now(INTERRUPTED);
+            }
+        })
+    });
+    watching
 }
 
 /// Calls `caught` at each of these signals, on a thread of its own.

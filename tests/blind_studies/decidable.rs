@@ -122,11 +122,11 @@ fn nearest(fitted: &Fitted, law: &Posterior) -> [f64; 4] {
     let fit = minimise(problem, &law.members, &law.u, &problem.variance, ROUNDS);
     let pull = fit.u[..NUISANCES].iter().map(|x| x * x).sum::<f64>();
     let residual = DVector::from_column_slice(&problem.lateral) - &fit.prediction;
-    let bare = problem.covariance(&DMatrix::zeros(problem.len(), 0)).log_det();
+    let bare = problem.covariance(&DMatrix::zeros(problem.len(), 0)).log_det;
     let shares = problem.constants.form_shares;
     let with = |share: f64| {
         let covariance = problem.covariance(&law.change.columns(&fitted.basis, share));
-        let cost = covariance.log_det() - bare;
+        let cost = covariance.log_det - bare;
         (cost, cost + covariance.quadratic(&residual) + pull)
     };
     let each: Vec<(f64, f64)> = shares.iter().map(|s| with(*s)).collect();

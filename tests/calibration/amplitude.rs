@@ -37,7 +37,8 @@ const NOISE_M_S: f64 = 2e-3;
 /// Relative repeatability from spot to spot.
 const SPECKLE_SD: f64 = 0.005;
 
-/// True standard deviation of one measured amplitude: speckle, and what a sine fitted to 200 samples leaves of the noise.
+/// True standard deviation of one measured amplitude: speckle, and what a sine fitted to 200 samples leaves
+/// of the noise.
 fn reading_sd(amplitude_pp_m: f64, frequency_hz: f64) -> f64 {
     (SPECKLE_SD * amplitude_pp_m).hypot(NOISE_M_S * (2.0f64 / 200.0).sqrt() / (PI * frequency_hz))
 }
@@ -88,8 +89,8 @@ impl Bench {
             ambient_pressure_pa: 101_325.0,
             temperature_c: 22.0,
         };
-        let known = self.world.truth().amplitude_pp_m;
-        let pp = self.world.config().defects.plate(&at, known);
+        let known = self.world.truth.amplitude_pp_m;
+        let pp = self.world.config.defects.plate(&at, known);
         let (rate, phase) = (1e6, self.draw.between(0.0, std::f64::consts::TAU));
         let v = PI * frequency_hz * pp * (1.0 + self.scale_error);
         let volts: Vec<f64> = (0..200)

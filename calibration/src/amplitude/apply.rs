@@ -112,7 +112,8 @@ pub struct AmplitudeCalibration {
     gain: f64,
     offset: f64,
     bend: f64,
-    gain_relative_sd: f64,
+    /// Relative standard uncertainty of the gain: what the diagnosis takes as `amplitude_gain_sd`.
+    pub gain_relative_sd: f64,
 }
 
 impl AmplitudeCalibration {
@@ -161,10 +162,5 @@ impl AmplitudeCalibration {
         }
         let root = self.gain * self.gain + 4.0 * self.bend * free;
         (root > 0.0).then(|| 2.0 * free / (self.gain + root.sqrt()))
-    }
-
-    /// Relative standard uncertainty of the gain: what the diagnosis takes as `amplitude_gain_sd`.
-    pub fn gain_relative_sd(&self) -> f64 {
-        self.gain_relative_sd
     }
 }

@@ -180,9 +180,14 @@ fn named_values<T>(
         let (name, value) = text.split_once('=')?;
         Some((name.trim().to_string(), parsed(value)?))
     };
-    list.iter()
-        .map(|text| entry(text).ok_or_else(|| miette::miette!("{option} {text}: {form} is needed")))
-        .collect()
+    let mut all = BTreeMap::new();
+    for text in list {
+        let wrong = || miette::miette!("{option} {text}: {form} is needed");
+        let (name, value) = entry(text).ok_or_else(wrong)?;
+        let is_new = all.insert(name, value).is_none();
+        miette::ensure!(is_new, help = "leave out one of the two", "{option} {text}: stated a second time");
+    }
+    Ok(all)
 }
 
 /// The spans of `--span`.
@@ -194,14 +199,19 @@ pub(crate) fn spans(list: &[String]) -> miette::Result<BTreeMap<String, ridge::S
     })
 }
 
-/// The rows of a table of variables.
-fn rows(path: &Path) -> miette::Result<Vec<Value>> {
+/// The rows of a table of variables, where all cases share `base`.
+fn rows(path: &Path, base: &BTreeMap<String, f64>) -> miette::Result<Vec<Value>> {
     let bytes = runs::input::bytes_of(path, runs::input::MAX_TABLE_BYTES)?;
     let mut reader = csv::Reader::from_reader(bytes.as_slice());
-    let mut all = Vec::new();
+    let (mut all, mut names) = (Vec::new(), base.clone());
+    for name in reader.headers().into_diagnostic().wrap_err_with(|| path.display().to_string())? {
+        let is_new = names.insert(name.to_string(), 0.0).is_none();
+        let help = "state it in one column, or with --set";
+        miette::ensure!(is_new, help = help, "{}: line 1: '{name}' is stated twice", path.display());
+    }
     for row in reader.deserialize::<BTreeMap<String, f64>>() {
         let row = row.into_diagnostic().wrap_err_with(|| path.display().to_string())?;
-        ridge::set(models::ridge::RidgeCase::paper(), &row).wrap_err_with(|| path.display().to_string())?;
+        ridge::checked(base, &row).wrap_err_with(|| path.display().to_string())?;
         all.push(serde_json::to_value(row).into_diagnostic()?);
     }
     Ok(all)
@@ -239,8 +249,9 @@ pub fn run(args: Args, json: bool) -> miette::Result<ExitCode> {
         What::Ridge(a) => {
             let steady = Steady { tolerance: a.tolerance, at_most: a.at_most, ..Steady::default() };
             let (elements, base, spans) = (a.elements, values(&a.set)?, spans(&a.span)?);
+            let lines = a.from.as_deref().map(|path| rows(path, &base)).transpose()?;
             let settings = ridge::Settings { elements, steady, base, spans, first: a.first, case: None };
-            let lines = a.from.as_deref().map(rows).transpose()?;
+            settings.check_spans()?;
             write("ridge", &a.to, a.draw.unwrap_or(0), &settings, lines.as_deref(), json)
         }
         What::Table(to) => write("table", &to, table::points().len() as u64, &Value::Null, None, json),

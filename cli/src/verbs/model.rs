@@ -13,8 +13,8 @@ mod stiffness;
 mod table;
 mod tabulate;
 
+use crate::verbs::prelude::*;
 use clap::{Args, Subcommand};
-use std::process::ExitCode;
 
 /// Arguments of `muprime model`.
 #[derive(Args)]
@@ -51,6 +51,13 @@ enum ModelVerb {
 /// Runs the subcommand. Bad input is refused with exit status 2; else it fails for an inner reason, such as a
 /// file that cannot be written.
 pub fn run(args: ModelArgs, json: bool) -> miette::Result<ExitCode> {
+    // A study of it says more.
+    let nothing = move |_| {
+        if json {
+            answer_json(&json!({ "partial": true }));
+        }
+    };
+    studies::progress::on_interrupt(&indicatif::ProgressBar::hidden(), nothing)?;
     match args.verb {
         ModelVerb::Point(args) => point::run(&args, json),
         ModelVerb::Ridge(args) => ridge::run(&args, json),

@@ -23,15 +23,21 @@ pub fn run(args: Args, json: bool) -> miette::Result<ExitCode> {
     if !fs::metadata(file).into_diagnostic().wrap_err_with(shown)?.is_file() {
         miette::bail!(help = "give a record, run-1.mcap and the like", "{} is not an ordinary file", shown());
     }
+    let record = || File::open(file).into_diagnostic().wrap_err_with(shown).map(BufReader::new);
+    // A whole record needs neither a lock nor a folder that can be written.
+    let found = recorder::inspect(record()?);
+    if found.intact() {
+        return whole(&found, &shown(), json);
+    }
     // Held to the end: a session would write on into the record that is replaced.
     let lock = file.with_file_name(runs::run_dir::LOCK);
     let held = lock.exists().then(|| runs::run_dir::claim(&lock)).transpose();
-    let _held = held.wrap_err_with(|| format!("{}: its run is live", shown()))?;
-    let damaged = BufReader::new(File::open(file).into_diagnostic().wrap_err_with(shown)?);
+    let _held =
+        held.wrap_err_with(|| format!("{}: its run is live, or its folder cannot be written", shown()))?;
     let part = files::beside(file);
-    let whole = Placed::fresh(&part)?;
-    let disk = whole.handle()?;
-    let found = recorder::recover(damaged, whole);
+    let mended = Placed::fresh(&part)?;
+    let disk = mended.handle()?;
+    let found = recorder::recover(record()?, mended);
     let found = found.into_diagnostic().and_then(|found| disk.sync().map(|()| found));
     if !matches!(found, Ok(Recovery::Rewritten { .. })) {
         fs::remove_file(&part).into_diagnostic()?;
@@ -51,13 +57,19 @@ pub fn run(args: Args, json: bool) -> miette::Result<ExitCode> {
                 found.sentences().iter().for_each(|sentence| say!("  {sentence}"));
             }
         }
-        Recovery::Whole(found) if json => {
-            answer_json(&json!({ "recovered": false, "whole": true, "integrity": found }));
-        }
-        Recovery::Whole(found) => {
-            say!("{}: whole, nothing to do", shown());
-            found.sentences().iter().for_each(|sentence| say!("  {sentence}"));
-        }
+        Recovery::Whole(found) => return whole(&found, &shown(), json),
+    }
+    exit(DONE)
+}
+
+/// The answer for a record that is whole.
+fn whole(found: &Integrity, shown: &str, json: bool) -> miette::Result<ExitCode> {
+    let document = json!({ "recovered": false, "whole": true, "integrity": found });
+    let words = found.sentences().iter().map(|sentence| format!("\n  {sentence}")).collect::<String>();
+    if json {
+        answer_json(&document)
+    } else {
+        say!("{shown}: whole, nothing to do{words}")
     }
     exit(DONE)
 }

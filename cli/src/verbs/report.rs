@@ -29,7 +29,8 @@ pub fn run(args: Args, json: bool) -> miette::Result<ExitCode> {
         if json {
             answer_json(&json!({ "report": args.run.join(super::run::campaign::PAGE), "claims": claims }));
         } else {
-            super::run::campaign::tell(&claims, made, planned, &args.run);
+            let command = format!("muprime run {}, with its options", quoted(args.run.display()));
+            super::run::campaign::tell(&claims, made, planned, &args.run, &command);
         }
         return exit(DONE);
     }

@@ -126,7 +126,7 @@ pub fn run(mut args: Args, json: bool) -> miette::Result<ExitCode> {
     }
     let runs = job.out.parent().filter(|p| !p.as_os_str().is_empty()).unwrap_or(Path::new("."));
     serve(&mut args, runs)?;
-    exit(if measure(job, points.len(), &args, json)? { DONE } else { FAILED })
+    exit(if measure(job, points.len(), &args, &watched()?, json)? { DONE } else { FAILED })
 }
 
 /// A dashboard, where the arguments want one, is served from here on, over a folder of runs.
@@ -145,14 +145,12 @@ fn serve(args: &mut Args, runs: &Path) -> miette::Result<()> {
 }
 
 /// Measures one run of so many passes. Returns whether it is complete, and the drive was read back off.
-fn measure(job: Job, planned: usize, args: &Args, json: bool) -> miette::Result<bool> {
+fn measure(job: Job, planned: usize, args: &Args, signals: &Signals, json: bool) -> miette::Result<bool> {
     if !job.fast {
         // In virtual time nothing is driven, and a slow reader gets every line.
         super::tell_beside(&job.out)?;
     }
     keys_are_free(&job, args.tui)?;
-    let signals = Signals::default();
-    watch_signals(&signals)?;
     // Up before anything moves, and down before the summary. Output in between is held and printed then.
     let watch = match args.tui {
         true => Some(Watch::begin(&job.out, Some(signals.clone()), job.setup.hand_at_key())?),
@@ -160,9 +158,9 @@ fn measure(job: Job, planned: usize, args: &Args, json: bool) -> miette::Result<
     };
     let mut followers = Followers::begin(&job, planned, args, json)?;
     let before = runs::run_dir::passes_in(&job.out).unwrap_or_default();
-    let mut feed = Feed::new(live::Run::of(&job, planned, before.len()), before, &signals);
+    let mut feed = Feed::new(live::Run::of(&job, planned, before.len()), before, signals);
     let continued = job.plan.file.continues.clone();
-    let summary = rig::wall_run::run(job, &signals, &mut |update| {
+    let summary = rig::wall_run::run(job, signals, &mut |update| {
         feed.update(&update);
         followers.update(&update);
     });
@@ -349,8 +347,10 @@ fn folder(named: Option<PathBuf>, plan: &str) -> miette::Result<(PathBuf, Made)>
     Ok((path, made))
 }
 
-/// Each of [`rig::terminal::STOPS`] asks for a stop; a second one leaves within two seconds whatever happens.
-fn watch_signals(signals: &Signals) -> miette::Result<()> {
+/// The requests to a run or to all sessions of a campaign: each of [`rig::terminal::STOPS`] asks for a stop; a
+/// second one leaves within two seconds whatever happens.
+fn watched() -> miette::Result<Signals> {
+    let signals = Signals::default();
     let (stops, mut is_first) = (Arc::clone(&signals.stops), true);
     studies::progress::on_signals(&rig::terminal::STOPS, move || {
         stops.fetch_add(1, Ordering::Relaxed);
@@ -362,7 +362,8 @@ fn watch_signals(signals: &Signals) -> miette::Result<()> {
         // The first one has sent the stop; nobody can wait here for what was read back.
         std::thread::sleep(std::time::Duration::from_millis(1500));
         runs::leave::leave_now(FAILED);
-    })
+    })?;
+    Ok(signals)
 }
 
 /// A bar that was not drawn yet: the first line of it too may find a terminal that takes nothing.

@@ -3,7 +3,7 @@
 use super::prelude::*;
 use studies::cases::plan::Pilot;
 use studies::cases::study::Study;
-use studies::cases::submit::{Options, Submitted, cancel, checked, submit, tasks};
+use studies::cases::submit::{Options, Submitted, cancel, checked, failed, submit, tasks};
 
 #[derive(Debug, clap::Args)]
 pub struct Args {
@@ -45,12 +45,14 @@ pub fn run(args: Args, json: bool) -> miette::Result<ExitCode> {
         }
         return exit(DONE);
     }
-    let submitted = submit(&study, options)?;
+    let mut submitted = submit(&study, options)?;
+    submitted.failed = failed(&study)?;
     let whole = submitted.missing == 0 || options.detach;
+    let all_failed = submitted.failed == submitted.cases;
     if json {
         answer_json(&submitted);
     } else {
-        let Submitted { cases, there, tasks, cases_a_task, limit_s, wall_seconds, .. } = submitted;
+        let Submitted { cases, there, failed, tasks, cases_a_task, limit_s, wall_seconds, .. } = submitted;
         if let Some(Pilot { cases, mean_s, longest_s, .. }) = submitted.pilot {
             say!(
                 "pilot: {mean_s:.3} s a case, the longest of {cases} {longest_s:.3} s; \
@@ -59,11 +61,11 @@ pub fn run(args: Args, json: bool) -> miette::Result<ExitCode> {
         }
         let (out, done) = (submitted.out.display(), cases - submitted.missing);
         out!(
-            "{out}: {done} of {cases} cases have a result, {there} of them from before; {wall_seconds:.1} s"
+            "{out}: {done} of {cases} cases were run, {there} of them before; {failed} failed; {wall_seconds:.1} s"
         );
         if !whole {
             out!("output of the tasks: {}", submitted.out.join("jobs").display());
         }
     }
-    exit(if whole { DONE } else { FAILED })
+    exit(if whole && !all_failed { DONE } else { FAILED })
 }

@@ -57,7 +57,7 @@ pub(super) fn grounds(
     (none, prediction): (&Posterior, &DVector<f64>),
     (scatter, lasting): (&Scatter, usize),
 ) -> (Vec<Ground>, f64) {
-    let evidence = |c: &Covariance| -0.5 * (c.quadratic(residual) + c.log_det());
+    let evidence = |c: &Covariance| -0.5 * (c.quadratic(residual) + c.log_det);
     let of = |under: Under| (under, under.problem(part, &none.u, prediction).covariance(jacobian));
     let settled = of(Under::Settled);
     let own = evidence(&settled.1);

@@ -45,7 +45,8 @@ pub struct Contact {
     pub friction_factor: f64,
     /// Adhesive force of the whole contact (DMT), N. 0 in the baseline.
     pub adhesion: f64,
-    /// Attraction that adds to the friction limit without holding the contact at lift-off. None in the baseline.
+    /// Attraction that adds to the friction limit without holding the contact at lift-off. None in the
+    /// baseline.
     pub attraction: Attraction,
     /// Exponent by which the friction limit departs from Amontons within the cycle: the limit is
     /// `mu0 F (F/reference_load)^load_exponent`. 0 in the baseline.
@@ -54,7 +55,8 @@ pub struct Contact {
     pub reference_load: f64,
     /// Inverse of the largest speed of lateral recovery, s/m. 0 in the baseline (infinitely fast).
     pub inverse_recovery_speed: f64,
-    /// Stretch below which that speed falls in proportion to the stretch, m. 0: the speed is the same at any stretch.
+    /// Stretch below which that speed falls in proportion to the stretch, m. 0: the speed is the same at any
+    /// stretch.
     pub recovery_knee: f64,
     /// Relaxation time of the lateral stretch out of contact, s. 0 in the baseline.
     pub lateral_relaxation_time: f64,
@@ -137,10 +139,6 @@ impl Contact {
     pub fn drag(&self) -> f64 {
         self.lateral_stiffness * self.speed
             / (2.0 * PI * self.frequency * self.mu0 * self.normal_stiffness * self.half_amplitude())
-    }
-    /// Whether anything acts on a contact beyond springs and Coulomb friction.
-    pub(crate) fn beyond_closed_form(&self) -> bool {
-        self.adhesion != 0.0 || self.needs_sweep()
     }
     fn needs_sweep(&self) -> bool {
         self.load_exponent != 0.0

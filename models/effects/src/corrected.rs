@@ -144,8 +144,9 @@ struct Compiled {
     theta: Vec<f64>,
 }
 
-/// Standard deviation of a law's form, as a share of the change that the effects make: a real cause never has exactly
-/// the library's form. On independent data true causes with another formula left 10 to 50 % of the gap.
+/// Standard deviation of a law's form, as a share of the change that the effects make: a real cause never has
+/// exactly the library's form. On independent data true causes with another formula left 10 to 50 % of the
+/// gap.
 const FORM_SHARE: f64 = 0.15;
 
 /// A corrected model, checked and ready for the loop.
@@ -155,7 +156,6 @@ pub struct Corrected {
     design: Design,
     effects: Vec<Compiled>,
     relative_sd: f64,
-    interpolation_error: f64,
     /// The base law, and the baseline from which changes count.
     law: Option<(Arc<dyn FrictionModel>, Baseline)>,
 }
@@ -237,7 +237,6 @@ impl Corrected {
             design: saved.design,
             effects,
             relative_sd: saved.relative_sd,
-            interpolation_error: saved.interpolation_error,
             law: law.zip(saved.law.as_ref().map(|l| l.reference)),
         })
     }
@@ -251,11 +250,6 @@ impl Corrected {
             let covariate = needs.filter_map(|n| n.covariate()).find(|k| k.of(&known).is_none())?;
             Some(Lack { effect: c.effect.name, law: law.name, covariate })
         })
-    }
-
-    /// Stated error of mu' by interpolation.
-    pub fn interpolation_error(&self) -> f64 {
-        self.interpolation_error
     }
 
     /// Signed mean lateral force that the sensor will read at a pass, N; NaN where the base law cannot tell.

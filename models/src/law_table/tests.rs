@@ -21,7 +21,7 @@ fn a_bilinear_law_is_read_exactly_and_nothing_is_said_beyond_it() {
         }
     }
     let law = LawTable::from_csv(&text).unwrap();
-    assert_eq!(law.rows(), 9);
+    assert_eq!(law.values.len(), 9);
     for (w, u) in [(1e-6, 0.01), (5e-6, 0.1), (3.3e-6, 0.02), (1.5e-6, 0.099)] {
         let p = law.predict(&at(w, u)).unwrap();
         assert!((p.mu_relative - f(w, u)).abs() < 1e-12 && (p.mu_relative_sd - 0.02).abs() < 1e-12);
@@ -79,7 +79,7 @@ fn a_grid_names_its_places_and_measures_its_error() {
     let answers =
         |checks| -> Vec<[f64; 2]> { grid.conditions(checks).iter().map(|c| [f(c[0], c[1]), 0.01]).collect() };
     let made = grid.table(400, &answers(400)).unwrap();
-    assert_eq!((made.checks, LawTable::from_csv(&made.csv).unwrap().rows()), (416, 45));
+    assert_eq!((made.checks, LawTable::from_csv(&made.csv).unwrap().values.len()), (416, 45));
     // The greatest error that is stated is the greatest of a dense search, within a fifth.
     let law = LawTable::from_csv(&made.csv).unwrap();
     let dense = (0..160_000)

@@ -86,12 +86,6 @@ impl ForceRows {
         let [owed3_x, owed3_y, owed4_x, owed4_y] = std::array::from_fn(|_| Field::zeros(nx));
         ForceRows { left_x, left_y, right_x, right_y, owed3_x, owed3_y, owed4_x, owed4_y }
     }
-
-    #[inline(always)]
-    pub(super) fn clear_owed(&mut self) {
-        let owed = [&mut self.owed3_x, &mut self.owed3_y, &mut self.owed4_x, &mut self.owed4_y];
-        owed.into_iter().for_each(|row| row.fill(0.0));
-    }
 }
 
 /// Work counted since the start, J per metre of depth.
@@ -155,7 +149,8 @@ pub struct Body {
     pub(super) layers: Vec<Layer>,
     /// Steps of the surface so far.
     pub(super) clock: usize,
-    mesh: Mesh,
+    /// As it was built.
+    pub(super) mesh: Mesh,
 }
 
 impl Body {
@@ -237,11 +232,6 @@ impl Body {
             clock: 0,
             mesh,
         }
-    }
-
-    /// The mesh as it was built.
-    pub fn mesh(&self) -> &Mesh {
-        &self.mesh
     }
 
     /// Index of the node in column `i` of row `j`.
@@ -347,8 +337,9 @@ impl Body {
         }
     }
 
-    /// Stiffness-proportional damping of an elastic body: from now on its stress is that of the strain and `beta_s` seconds times its
-    /// rate. It stands in the place of the viscous arms, as an arm that forgets everything within a step. The hourglass control has none.
+    /// Stiffness-proportional damping of an elastic body: from now on its stress is that of the strain and
+    /// `beta_s` seconds times its rate. It stands in the place of the viscous arms, as an arm that forgets
+    /// everything within a step. The hourglass control has none.
     pub fn damp_stiffness(&mut self, beta_s: f64) {
         if self.mesh.row_material.iter().any(|m| m.arm().is_some()) || beta_s <= 0.0 {
             return;
@@ -358,8 +349,9 @@ impl Body {
         self.arm = Stress::zeros(self.length.len());
     }
 
-    /// Advances `count` steps of `dt` seconds (of the surface, see [`Body::move_in_longer_steps`]). `contact` sees the surface in each.
-    /// Nothing is checked here: see [`super::stability`] for the step and [`Body::is_finite`].
+    /// Advances `count` steps of `dt` seconds (of the surface, see [`Body::move_in_longer_steps`]). `contact`
+    /// sees the surface in each. Nothing is checked here: see [`super::stability`] for the step and
+    /// [`Body::is_finite`].
     pub fn advance(
         &mut self,
         dt: f64,

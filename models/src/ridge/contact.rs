@@ -34,11 +34,13 @@ pub struct ContactForce {
 /// A rigid plate under the surface row.
 #[derive(Clone, Debug)]
 pub struct Plate {
-    penalty: Vec<f64>,
-    /// Springs along the plate, N/m per metre of depth.
-    along: Vec<f64>,
+    /// Springs of the surface nodes, N/m per metre of depth.
+    pub penalty: Vec<f64>,
+    /// The same along the plate.
+    pub along: Vec<f64>,
     stretch: Vec<f64>,
-    load: Vec<f64>,
+    /// Normal force on each surface node in the last step, N per metre of depth.
+    pub load: Vec<f64>,
     rule: FrictionRule,
     mu0: f64,
 }
@@ -47,15 +49,17 @@ impl Plate {
     /// `penalty`: spring of each surface node, N/m per metre of depth (zero: the node never touches).
     pub fn new(penalty: Vec<f64>, rule: FrictionRule, mu0: f64) -> Result<Plate, RidgeError> {
         RidgeError::unless((0.0..=10.0).contains(&mu0), "coefficient of friction", mu0, "0 to 10")?;
-        if let Some(bad) = penalty.iter().find(|k| !(**k >= 0.0 && k.is_finite())) {
-            return Err(RidgeError::input("contact penalty in Pa", *bad, "0 or above"));
-        }
+        let sound = |k: f64| k >= 0.0 && k.is_finite();
+        penalty
+            .iter()
+            .try_for_each(|k| RidgeError::unless(sound(*k), "contact penalty in Pa", *k, "0 or above"))?;
         let n = penalty.len();
         let along = penalty.clone();
         Ok(Plate { penalty, along, stretch: vec![0.0; n], load: vec![0.0; n], rule, mu0 })
     }
 
-    /// The same with springs along the plate that are softer than those across it by `ratio`, above 0 and up to 1.
+    /// The same with springs along the plate that are softer than those across it by `ratio`, above 0 and up
+    /// to 1.
     pub fn softer_along(self, ratio: f64) -> Result<Plate, RidgeError> {
         let possible = ratio > 0.0 && ratio <= 1.0;
         RidgeError::unless(possible, "tangential penalty ratio", ratio, "above 0, up to 1")?;
@@ -63,8 +67,9 @@ impl Plate {
         Ok(Plate { along, ..self })
     }
 
-    /// The same with a layer on the plate, in series with the springs along it: of shear traction over slip `pa_per_m` (Pa/m, above 0),
-    /// at nodes that stand for `width_m` each. Unlike a node's spring it is the same contact on every mesh.
+    /// The same with a layer on the plate, in series with the springs along it: of shear traction over slip
+    /// `pa_per_m` (Pa/m, above 0), at nodes that stand for `width_m` each. Unlike a node's spring it is the
+    /// same contact on every mesh.
     pub fn layered(self, pa_per_m: f64, width_m: &[f64]) -> Result<Plate, RidgeError> {
         let possible = pa_per_m > 0.0 && pa_per_m.is_finite() && width_m.len() >= self.along.len();
         let range = "above 0 and finite, with a width for each node";
@@ -73,21 +78,6 @@ impl Plate {
             |(k, w): (&f64, &f64)| if *k > 0.0 { 1.0 / (1.0 / k + 1.0 / (pa_per_m * w)) } else { 0.0 };
         let along = self.along.iter().zip(width_m).map(series).collect();
         Ok(Plate { along, ..self })
-    }
-
-    /// Springs of the surface nodes, N/m per metre of depth.
-    pub fn penalty(&self) -> &[f64] {
-        &self.penalty
-    }
-
-    /// The same along the plate.
-    pub fn along(&self) -> &[f64] {
-        &self.along
-    }
-
-    /// Normal force on each surface node in the last step, N per metre of depth.
-    pub fn node_load(&self) -> &[f64] {
-        &self.load
     }
 
     /// Presses and drags the surface: the plate stands at `height` (m) and moves along +x at `speed` (m/s).

@@ -128,7 +128,9 @@ fn sweep<S: Simd, const OBJECTIVE: bool, const VISCOUS: bool, const ENERGY: bool
     body.clock += 1;
     let moving = body.layers.iter().take_while(|layer| body.clock.is_multiple_of(layer.every)).count();
     let end = body.layers.get(moving).map_or(ny, |layer| layer.first);
-    body.rows.clear_owed();
+    let rows = &mut body.rows;
+    let owed = [&mut rows.owed3_x, &mut rows.owed3_y, &mut rows.owed4_x, &mut rows.owed4_y];
+    owed.into_iter().for_each(|row| row.fill(0.0));
     let mut level = 0;
     for j in 0..end {
         let interface = body.layers.get(level).is_some_and(|layer| layer.first == j);
@@ -242,7 +244,8 @@ fn element_row<S: Simd, const OBJECTIVE: bool, const VISCOUS: bool>(
     let law: &RowLaw = &body.laws[j];
     let constant = |value| Lanes::splat(simd, value);
     let (bulk, rigidity) = (constant(law.bulk * step.dt), constant(law.shear * step.dt));
-    // Strains are rates here: the step is in the constants, so that fewer multiplications are left to the elements.
+    // Strains are rates here: the step is in the constants, so that fewer multiplications are left to the
+    // elements.
     let viscosity1 = constant(law.linear_viscosity);
     let viscosity2 = constant(law.quadratic_viscosity);
     let (decay, gain) = (constant(law.arm_decay), constant(law.arm_gain));

@@ -6,6 +6,7 @@
 //! quasi-static slip state, and after each cycle the lateral load follows the mean friction: this skips the
 //! slow drift of the soft tissue and nothing else. At the end both agree, which is checked.
 
+use super::body::{Energy, Work};
 use super::cycle::{self, BINS, Cycle, Steady, mean};
 use super::{Body, ContactForce, Plate, RidgeCase, RidgeError, stability};
 use crate::psi::PsiEq17;
@@ -23,7 +24,8 @@ const FULL_CONTACT: f64 = 0.999;
 const RAMP_CYCLES: usize = 2;
 /// Share of the gap to the mean friction that the lateral load takes after each cycle.
 const FOLLOW: f64 = 0.5;
-/// Mass added about the tip by default, as a share of the stratum corneum's: see 'Performance' in `docs/ridge.md`.
+/// Mass added about the tip by default, as a share of the stratum corneum's: see 'Performance' in
+/// `docs/ridge.md`.
 pub const ADDED_MASS: f64 = 0.002;
 
 /// How to run a case.
@@ -38,9 +40,11 @@ pub struct RunSettings {
     /// Amplitude from which the run comes, over the case's: 1 grows to it from rest, in contact for as long
     /// as possible; more comes down to it, from contact that is lost or doubled. From 1 to 10.
     pub overshoot: f64,
-    /// Whether all layers move in the surface's step; otherwise the soft ones in longer ones (`stability::longer_steps`).
+    /// Whether all layers move in the surface's step; otherwise the soft ones in longer ones
+    /// (`stability::longer_steps`).
     pub one_step: bool,
-    /// Mass added about the tip for a longer step (`stability::add_mass`), as a share of the stratum corneum's.
+    /// Mass added about the tip for a longer step (`stability::add_mass`), as a share of the stratum
+    /// corneum's.
     pub added_mass: f64,
 }
 
@@ -157,8 +161,8 @@ impl Rig {
         body.hold_top();
         body.damp_stiffness(case.stiffness_damping_s);
         body.count_energy = settings.energy;
-        stability::add_mass(&mut body, plate.penalty(), settings.added_mass);
-        let stable = stability::contact_step_s(&body, plate.penalty());
+        stability::add_mass(&mut body, &plate.penalty, settings.added_mass);
+        let stable = stability::contact_step_s(&body, &plate.penalty);
         if let Some(wanted_s) = settings.step_s
             && !(wanted_s > 0.0 && wanted_s <= stable)
         {
@@ -233,38 +237,29 @@ impl Rig {
     }
 
     fn tally(&self) -> Tally {
-        let (energy, work) = (self.body.energy(), self.body.work);
-        Tally {
-            kinetic: energy.kinetic,
-            stored: energy.elastic + energy.hourglass,
-            inner: work.internal + self.plate_work,
-            load: work.load,
-            damping: work.damping,
-            plate: self.plate_work,
-        }
+        Tally { energy: self.body.energy(), work: self.body.work, plate: self.plate_work }
     }
 }
 
 /// Energies and works since the start, J per metre of depth.
 #[derive(Clone, Copy, Default)]
 struct Tally {
-    kinetic: f64,
-    stored: f64,
-    inner: f64,
-    load: f64,
-    damping: f64,
+    energy: Energy,
+    work: Work,
     plate: f64,
 }
 
 impl Tally {
     fn since(&self, start: &Tally) -> EnergyBalance {
-        let stored = self.stored - start.stored;
+        let stored = |t: &Tally| t.energy.elastic + t.energy.hourglass;
+        let stored = stored(self) - stored(start);
+        let inner = |t: &Tally| t.work.internal + t.plate;
         EnergyBalance {
             plate_work: self.plate - start.plate,
-            load_work: self.load - start.load,
-            damping_loss: self.damping - start.damping,
-            inner_loss: self.inner - start.inner - stored,
-            stored: stored + self.kinetic - start.kinetic,
+            load_work: self.work.load - start.work.load,
+            damping_loss: self.work.damping - start.work.damping,
+            inner_loss: inner(self) - inner(start) - stored,
+            stored: stored + self.energy.kinetic - start.energy.kinetic,
         }
     }
 }
@@ -377,7 +372,7 @@ pub fn run_watched(
         psi_eq16: 0.5 * psi,
         cycles: values.len(),
         averaged_cycles: averaged,
-        elements: rig.body.mesh().elements(),
+        elements: rig.body.mesh.elements(),
         steps: rig.steps,
         step_s: rig.dt,
         memory_bytes: rig.body.memory_bytes() + history.len() * 3 * BINS * size_of::<f64>(),

@@ -149,11 +149,6 @@ impl PhaseCurves {
         Ok(PhaseCurves { amplitudes: amplitudes.to_vec(), grid, places, phase_deg })
     }
 
-    /// The skins on which the model was run.
-    pub fn grid(&self) -> &SkinGrid {
-        &self.grid
-    }
-
     /// Phase in degrees for a skin at one of the amplitudes; not a number at any other amplitude. Beyond an
     /// end of the grid it is that at the end.
     pub fn at(&self, skin: &Skin, amplitude: PeakToPeak) -> f64 {

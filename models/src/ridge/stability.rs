@@ -27,7 +27,7 @@ pub fn highest_frequency_rad_s(body: &Body, penalty: &[f64]) -> f64 {
     probe.move_in_longer_steps(&[]);
     probe.load_x.fill(0.0);
     probe.load_y.fill(0.0);
-    for (law, material) in probe.laws.iter_mut().zip(&body.mesh().row_material) {
+    for (law, material) in probe.laws.iter_mut().zip(&body.mesh.row_material) {
         let fast = 1.0 + material.arm().map_or(0.0, |a| a.ratio);
         law.bulk *= fast;
         law.shear *= fast;
@@ -87,7 +87,8 @@ pub fn stable_step_s(highest_frequency_rad_s: f64) -> f64 {
     STEP_SAFETY * 2.0 / highest_frequency_rad_s * ((1.0 + xi * xi).sqrt() - xi)
 }
 
-/// The same with stiffness-proportional damping of `beta_s` seconds: half of it times the frequency adds to the damping ratio.
+/// The same with stiffness-proportional damping of `beta_s` seconds: half of it times the frequency adds to
+/// the damping ratio.
 pub fn damped_step_s(highest_frequency_rad_s: f64, beta_s: f64) -> f64 {
     let xi = LINEAR_BULK_VISCOSITY + 0.5 * beta_s * highest_frequency_rad_s;
     // The form that keeps its digits where the ratio is large.
@@ -110,11 +111,12 @@ pub fn contact_step_s(body: &Body, penalty: &[f64]) -> f64 {
 /// Adds mass to the nodes whose elements and contact springs alone hold the step down, `share` of the first
 /// layer's mass in all, and returns what was added in kg per metre of depth.
 ///
-/// A node's mass suffices for a step dt where it is at least dt^2/4 (sum of omega_e^2 m_e + k), omega_e = 2 c / l the highest
-/// frequency of each element beside it, m_e its share of the element's mass and k its contact spring. The step is raised until
-/// what is missing is the mass that may be added. At the ridge's tip elements are small both ways, so little mass goes far.
+/// A node's mass suffices for a step dt where it is at least dt^2/4 (sum of omega_e^2 m_e + k), omega_e = 2 c
+/// / l the highest frequency of each element beside it, m_e its share of the element's mass and k its contact
+/// spring. The step is raised until what is missing is the mass that may be added. At the ridge's tip
+/// elements are small both ways, so little mass goes far.
 pub fn add_mass(body: &mut Body, penalty: &[f64], share: f64) -> f64 {
-    let mesh = body.mesh();
+    let mesh = &body.mesh;
     let (nx, stride) = (mesh.nx, mesh.stride());
     let first = &mesh.row_material[0];
     let rows = mesh.row_material.iter().take_while(|m| *m == first).count();
@@ -158,10 +160,11 @@ pub fn add_mass(body: &mut Body, penalty: &[f64], share: f64) -> f64 {
 /// it, in the greatest power of two of steps `dt` that is within `LONGER_STEP_SHARE` of its own stable step and no more than
 /// `MOST_STEPS_IN_ONE`. The layer is taken alone, free where it is held by the stiffer one: a bound from above on its frequency.
 ///
-/// Impulses feed a fast motion whose half period is the longer step; mass damping must take more. A layer therefore moves in longer
-/// steps only where the damping of one of them, `mass_damping_per_s` times its length, is at least `DAMPING_IN_A_LONGER_STEP`.
+/// Impulses feed a fast motion whose half period is the longer step; mass damping must take more. A layer
+/// therefore moves in longer steps only where the damping of one of them, `mass_damping_per_s` times its
+/// length, is at least `DAMPING_IN_A_LONGER_STEP`.
 pub fn longer_steps(body: &Body, dt: f64, mass_damping_per_s: f64) -> Vec<(usize, usize)> {
-    let mesh = body.mesh();
+    let mesh = &body.mesh;
     let mut layers: Vec<(usize, usize)> = Vec::new();
     for first in (1..mesh.ny).filter(|j| mesh.row_material[*j] != mesh.row_material[*j - 1]) {
         let nodes = first * mesh.stride()..;

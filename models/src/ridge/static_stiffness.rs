@@ -1,8 +1,10 @@
-//! The static stiffnesses of a ridge on a plate, across it (`k_n`) and along it (`k_l`): their ratio is what Eq. 16 has in Psi.
+//! The static stiffnesses of a ridge on a plate, across it (`k_n`) and along it (`k_l`): their ratio is what
+//! Eq. 16 has in Psi.
 //!
-//! The stiffness matrix is the kernel's own at its first geometry: layers, hourglass control and all ([`banded`]). The
-//! skin is held at a depth ([`HeldAt`]), pressed without friction on the plate up to a load, through the penalty springs where it
-//! touches. Then the plate is moved a little either way with the touching nodes stuck to it.
+//! The stiffness matrix is the kernel's own at its first geometry: layers, hourglass control and all
+//! ([`banded`]). The skin is held at a depth ([`HeldAt`]), pressed without friction on the plate up to a
+//! load, through the penalty springs where it touches. Then the plate is moved a little either way with the
+//! touching nodes stuck to it.
 //!
 //! All is per metre of depth and linear: small strain, relaxed moduli.
 
@@ -43,7 +45,8 @@ pub struct Springs {
 pub struct StaticStiffness {
     /// Load, N/m.
     pub line_load_n_m: f64,
-    /// Width of a Hertz contact whose pressure has the same second moment, m; that of the nodes themselves is up to a node wider.
+    /// Width of a Hertz contact whose pressure has the same second moment, m; that of the nodes themselves is
+    /// up to a node wider.
     pub contact_width_m: f64,
     /// Greatest mean pressure over a node's width, Pa.
     pub peak_pressure_pa: f64,
@@ -73,7 +76,7 @@ pub fn of_case(case: &RidgeCase, line_load_n_m: f64, held: HeldAt) -> Result<Sta
     case.check()?;
     let built = case.geometry.mesh(case.materials(), case.elements)?;
     let plate = case.plate(&built)?;
-    let springs = Springs { across: plate.penalty().to_vec(), along: plate.along().to_vec() };
+    let springs = Springs { across: plate.penalty.clone(), along: plate.along.clone() };
     let soft_rows = (built.mesh.ny - built.corneum_rows) / 2;
     let row = match held {
         HeldAt::CorneumBase => built.corneum_rows,

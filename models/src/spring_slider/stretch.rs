@@ -54,15 +54,11 @@ impl Stretch {
         -self.alpha
     }
 
-    /// Area under `g` between two phases.
-    fn area(&self, from: f64, to: f64) -> f64 {
-        to.sin() - from.sin() + self.offset * (to - from)
-    }
-
     /// The periodic steady state: the stretch at touch-down, and the turn from there.
     pub(super) fn steady(&self) -> (f64, Turn) {
-        // Instant recovery forgets everything at separation. In full contact the stretch can be no less than the
-        // smallest limit, which is where the turn starts: exact for instant recovery, even infinitely slow.
+        // Instant recovery forgets everything at separation. In full contact the stretch can be no less than
+        // the smallest limit, which is where the turn starts: exact for instant recovery, even infinitely
+        // slow.
         let mut x = if self.always_touching { self.g(self.start()) } else { 0.0 };
         let mut turn = self.turn(x);
         for _ in 0..3 {
@@ -97,7 +93,8 @@ impl Stretch {
                     turn.slip_onset = Some(to);
                 }
             }
-            Piece::Slip | Piece::Recover => sum += self.area(from, to),
+            // The area under `g`.
+            Piece::Slip | Piece::Recover => sum += to.sin() - from.sin() + self.offset * (to - from),
         });
         turn.mean_force = sum / (2.0 * PI);
         turn.left_over = if self.always_touching {
@@ -188,7 +185,8 @@ impl Stretch {
         end
     }
 
-    /// Where slip along `g` next becomes impossible: `g` rises faster than `kappa` or falls faster than `rho`.
+    /// Where slip along `g` next becomes impossible: `g` rises faster than `kappa` or falls faster than
+    /// `rho`.
     fn leave(&self, phi: f64, end: f64) -> f64 {
         let ends = [(self.kappa, -PI), (self.rho, 0.0)].into_iter().filter(|(rate, _)| *rate < 1.0);
         let ahead = ends.map(|(rate, from)| from + rate.asin()).filter(|p| *p > phi + 1e-12);

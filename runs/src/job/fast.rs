@@ -90,7 +90,7 @@ fn sweep(
 ) -> (miette::Result<Outcome>, OffReport) {
     // A failure to save ends the sweep.
     let unsaved = RefCell::new(None);
-    let mut knows = false;
+    let (mut knows, mut stops) = (false, 0);
     let mut ask = || {
         // In virtual time there is nothing to wait for: a pause would only fill the record.
         let ends = |end| Requests { end, pause: false };
@@ -98,7 +98,9 @@ fn sweep(
             knows = true;
             return ends(Some(End::NotSaved));
         }
-        ends((signals.stops.swap(0, Ordering::Relaxed) > 0).then_some(End::Requested))
+        // Counted, not taken: a campaign looks at it after the session.
+        let before = std::mem::replace(&mut stops, signals.stops.load(Ordering::Relaxed));
+        ends((stops > before).then_some(End::Requested))
     };
     let mut snapshots = Snapshots::of(EPOCH_UNIX_NS, rig.period());
     let mut save = |row: &Row, sequence: &Sequence, reaction: Reaction| -> miette::Result<()> {

@@ -276,9 +276,7 @@ fn allowed(covariate: &Covariate, limits: &Limits) -> [f64; 2] {
 }
 
 pub(crate) fn series_place(text: &str, index: usize, name: &str) -> Option<Range<usize>> {
-    let table = toml::de::DeTable::parse(text).ok()?;
-    let series = table.get_ref().get("series")?.get_ref().as_array()?;
-    series.get(index)?.get_ref().as_table()?.get(name).map(toml::Spanned::span)
+    input::place_in(text, "series", index, name)
 }
 
 #[cfg(test)]
@@ -298,6 +296,18 @@ mod tests {
         assert!(why.to_string().starts_with("normal_force_n = -0.25 N is outside"), "{why}");
         let help = why.help().unwrap().to_string();
         assert_eq!(help, "normal_force_n is a magnitude: write it without the minus sign");
+    }
+
+    /// Every pass of it was made twice.
+    #[test]
+    fn a_series_that_is_there_twice_is_refused_in_its_place() {
+        let series = |name: &str| format!("[[series]]\nname = \"{name}\"\namplitude_pp_m = [1e-6, 2e-6]\n");
+        let base = "name = \"p\"\n[base]\namplitude_pp_m = 2e-6\nfrequency_hz = 27500\nspeed_m_s = 0.02\n\
+                    normal_force_n = 0.25\n";
+        let text = format!("{base}{}{}", series("a"), series("b"));
+        let why = Plan::parse("p", &text).unwrap_err();
+        assert!(format!("{why:?}").contains("p:12:18") && why.help().is_some(), "{why:?}");
+        Plan::parse("p", &format!("{text}edges = 1\n")).unwrap();
     }
 
     /// It had neither a place nor a remedy.

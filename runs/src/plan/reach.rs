@@ -1,10 +1,12 @@
 //! What the instruments themselves can do and see, by their profiles: a plan beyond it would trip in the
 //! middle of its sweep.
 
-use super::{PassTimes, Plan};
+use super::{PassTimes, Plan, Point};
 use crate::human::quantity;
 use crate::input::{Problems, place_of};
+use models::condition::Condition;
 use models::covariate::Covariate;
+use models::quantity::PeakToPeak;
 
 /// The values of one setting that an instrument takes or sees, or that a limit allows.
 #[derive(Clone, Debug, PartialEq)]
@@ -50,6 +52,20 @@ impl Plan {
 /// Relative rounding of a range that is counted in the instrument's units.
 const ROUNDING: f64 = 1e-9;
 
+/// The normal forces at which a pass without vibration does not reach the limit of the lateral force; none
+/// where no pass reaches it.
+pub fn lateral_reach(points: &[Point], mu0: f64, most_n: f64) -> Option<Reach> {
+    let reaches = |c: &Condition| c.amplitude == PeakToPeak::ZERO && mu0 * c.normal_force_n >= most_n;
+    points.iter().any(|point| reaches(&point.condition)).then(|| Reach {
+        column: "normal_force_n",
+        range: [f64::MIN_POSITIVE, (most_n / mu0).next_down()],
+        by: format!(
+            "lateral_force_max_n = {} allows a pass without vibration at mu0 = {mu0} (SR-05)",
+            quantity(most_n, "N")
+        ),
+    })
+}
+
 /// What allows the smallest speed.
 fn of_speed(reaches: &[Reach]) -> Option<&Reach> {
     let all = reaches.iter().filter(|reach| reach.column == "speed_m_s");
@@ -83,6 +99,31 @@ mod tests {
         let message = format!("{refused:?}");
         assert!(message.contains("`a` takes") && message.contains("`s` sees"), "{message}");
     }
+
+    /// It tripped at its first reference (SR-05).
+    #[test]
+    fn a_load_whose_friction_reaches_the_lateral_limit_is_refused_in_its_place() {
+        let text = "name = \"r\"\nreference_every = 0\n[base]\namplitude_pp_m = 2e-6\nfrequency_hz = 27500\nspeed_m_s = 0.02\n\
+             normal_force_n = 0.25\n[[series]]\namplitude_pp_m = [0, 2e-6]\n";
+        let limits = realtime::safety::Limits::paper(realtime::ports::Nanos(1_000_000));
+        let fine = crate::plan::Resolution { amplitude_pp_m: 0.0, frequency_hz: 0.0 };
+        let found = |text: &str, most_n| {
+            let plan = Plan::parse("r", text).unwrap();
+            let points = plan.points(1, &limits, &fine).unwrap();
+            plan.check_reach(lateral_reach(&points, 0.5, most_n).as_slice())
+        };
+        for most_n in [0.11, 0.125] {
+            let why = found(text, most_n).unwrap_err();
+            let message = format!("{why:?}");
+            assert!(message.contains("(SR-05)") && message.contains("r:7:18"), "{message}");
+            let help = why.help().unwrap().to_string();
+            assert!(help.contains("limits"), "{help}");
+        }
+        found(text, 0.126).unwrap();
+        // With vibration friction stays below it.
+        found(&text.replace("[0, 2e-6]", "[1e-6, 2e-6]"), 0.11).unwrap();
+    }
+
     /// A stage that does less than the travel's usual speed: every sweep was refused at the wire, and
     /// reported as a stage that does not follow.
     #[test]

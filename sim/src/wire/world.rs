@@ -61,12 +61,14 @@ pub struct WorldPlant {
 /// Time that the stage moves on without a new heartbeat: twice that of the amplifier's watchdog, so that the
 /// plate is quiet before the finger leaves it.
 pub const STAGE_HEARTBEAT_WITHIN: Nanos = Nanos(100_000_000);
-/// Time that the switch in the supply stays closed without a new heartbeat: what the profiles of watchdog outputs have as `timeout_ms`.
+/// Time that the switch in the supply stays closed without a new heartbeat: what the profiles of watchdog
+/// outputs have as `timeout_ms`.
 pub const SUPPLY_HEARTBEAT_WITHIN: Nanos = Nanos(200_000_000);
 const AT_REST: StageInput = StageInput { velocity_m_s: 0.0, normal_force_n: 0.0 };
 
-/// A watchdog of the stage or of the supply's switch: where heartbeats have come and then stand still, the stage stops and lifts off,
-/// or the switch opens, and takes no set-point until the heartbeat goes on. A controller whose profile has no heartbeat is not watched.
+/// A watchdog of the stage or of the supply's switch: where heartbeats have come and then stand still, the
+/// stage stops and lifts off, or the switch opens, and takes no set-point until the heartbeat goes on. A
+/// controller whose profile has no heartbeat is not watched.
 #[derive(Clone, Copy)]
 struct Watchdog {
     /// How long it waits.
@@ -132,7 +134,7 @@ impl Plant for WorldPlant {
         self.world.advance_to(now);
         self.hands.shared().free = Laser {
             amplitude_pp_m: self.world.free_amplitude_pp_m(),
-            frequency_hz: self.world.truth().frequency_hz,
+            frequency_hz: self.world.truth.frequency_hz,
             time_s: self.world.now().seconds(),
         };
     }
@@ -247,7 +249,7 @@ mod tests {
             slide(&mut plant, Some(n as f64));
         }
         let moving = |plant: &mut WorldPlant| plant.measure(Quantity::Velocity).abs() > 1e-3;
-        let loaded = |plant: &mut WorldPlant| plant.world.truth().normal_force_n > 0.01;
+        let loaded = |plant: &mut WorldPlant| plant.world.truth.normal_force_n > 0.01;
         plant.advance(ms(390));
         assert!(moving(&mut plant) && loaded(&mut plant), "within its time it goes on");
         // The controller is dead; the same heartbeat over and over is no life.

@@ -15,13 +15,14 @@ use indicatif::ProgressBar;
 use miette::{Context, IntoDiagnostic};
 use rayon::prelude::*;
 use runs::job::Unfinished;
-use runs::print::quoted;
+use runs::print::{answer_json, quoted};
 use runs::say;
 use serde::Serialize;
 use serde_json::{Value, json};
 use std::ops::Range;
 use std::path::{Path, PathBuf};
 use std::sync::Mutex;
+use std::sync::atomic::Ordering;
 use std::time::{Duration, Instant};
 
 /// Periods between two looks into the folder: a hundredth of the time that has passed, within these bounds.
@@ -114,6 +115,8 @@ pub struct Submitted {
     pub there: u64,
     /// Cases without a result now.
     pub missing: u64,
+    /// Those of the others that failed, as [`failed`] counts them.
+    pub failed: u64,
     /// What the pilot measured.
     pub pilot: Option<Pilot>,
     /// Tasks handed over, in all rounds.
@@ -141,20 +144,16 @@ pub fn submit(study: &Study, options: &Options) -> miette::Result<Submitted> {
     let bar = progress::bar(cases, "cases");
     bar.set_position(cases - first);
     let (out, by) = (study.out.display().to_string(), options.engine.clone());
-    // Once: several studies may be submitted by one command.
-    static SUBMITTED: std::sync::Once = std::sync::Once::new();
-    let first_time = !SUBMITTED.is_completed();
-    SUBMITTED.call_once(|| ());
-    let report = move |done| {
+    progress::on_interrupt(&bar, move |done| {
         let ended = by == "local" || by == "dask";
         let goes_on = if ended { "is over" } else { "goes on without this command" };
         say!("{done} of {cases} cases are in {out}; what was at work {goes_on}");
         let end = format!("; `muprime submit --cancel --out {}` ends what runs", quoted(&out));
         say!("the same command goes on from there{}", if ended { "" } else { &end });
-    };
-    if first_time {
-        progress::on_interrupt(&bar, report)?;
-    }
+        if progress::JSON.load(Ordering::Relaxed) {
+            answer_json(&json!({ "partial": true, "out": out, "cases": cases, "done": done }));
+        }
+    })?;
     let mut submitted = Submitted {
         out: study.out.clone(),
         engine: options.engine.clone(),
@@ -213,6 +212,17 @@ pub fn submit(study: &Study, options: &Options) -> miette::Result<Submitted> {
     bar.finish_and_clear();
     submitted.wall_seconds = begun.elapsed().as_secs_f64();
     Ok(submitted)
+}
+
+/// Cases of a study that failed. Errors: a folder that cannot be read; a shard that cannot is for [`gather`].
+pub fn failed(study: &Study) -> miette::Result<u64> {
+    let (mut failed, mut next) = (0, 0);
+    for range in study.ranges_there()? {
+        let entries = Reader::open(study.kind, &study.shard(&range)).into_iter().flatten().flatten();
+        failed += entries.filter(|entry| entry.index >= next && entry.outcome.is_err()).count() as u64;
+        next = range.end.max(next);
+    }
+    Ok(failed)
 }
 
 /// Cases of one name in a folder, run where they have no result, and read: `NAME.jsonl` are the cases,

@@ -169,6 +169,9 @@ pub(super) fn remedy(kind: Option<&str>) -> String {
         Some("table") => {
             "`muprime import` makes a point table of a foreign one; docs/contract.md lists the columns".into()
         }
+        Some("law table") => {
+            "docs/own-law.md lists the columns of a law table; `muprime model tabulate` makes one".into()
+        }
         Some("record") => {
             "`muprime recover FILE` makes what is whole readable again, and keeps the original".into()
         }

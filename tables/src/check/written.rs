@@ -1,6 +1,6 @@
 //! What the program itself wrote: tables, records, journals, run folders, verdicts.
 
-use super::place::{problems_of, remedy};
+use super::place::{self, problems_of, remedy};
 use super::{Good, On, judge, kind_of, read_json, shape};
 use crate::diagnose::unfit;
 use crate::import::{as_csv, remarks};
@@ -23,7 +23,8 @@ pub(super) fn table(path: &Path) -> miette::Result<Good> {
         |column: &str| rows.lines().next().is_some_and(|head| head.split(',').any(|h| h.trim() == column));
     let good = |kind, passes| Good { kind, passes, remarks: Vec::new() };
     if let Some(text) = text.filter(|_| has(models::law_table::ANSWERS[0].0) && !has("point")) {
-        runs::model_file::load(&name, text)?;
+        let loaded = runs::model_file::load(&name, text);
+        loaded.map_err(|why| place::with_place_and_help(why, &name, Some("law table")))?;
         return Ok(good("law table", None));
     }
     if has(effects::own::COLUMN) {
@@ -150,4 +151,21 @@ pub(super) fn verdict(name: &str) -> miette::Result<()> {
         wrong.add_at(place, format!("the probabilities of its hypotheses sum to {sum}, not to 1"), None);
     }
     wrong.end()
+}
+
+#[cfg(test)]
+mod tests {
+    /// It named the tool and the columns of a point table.
+    #[test]
+    fn a_faulty_law_table_is_helped_as_one() {
+        let folder = tempfile::tempdir().unwrap();
+        let path = folder.path().join("law.csv");
+        let row = "2e-7,0.01,0.6,0.001\n";
+        std::fs::write(&path, format!("amplitude_pp_m,speed_m_s,mu_relative,mu_relative_sd\n{row}{row}"))
+            .unwrap();
+        let why = super::table(&path).err().unwrap();
+        let problem = super::problems_of(&why).remove(0);
+        let help = problem.help.unwrap_or_default();
+        assert!(problem.line == Some(3) && help.contains("own-law.md"), "{why:?}");
+    }
 }

@@ -79,6 +79,7 @@ pub fn run(args: &AdaptArgs, json: bool) -> miette::Result<ExitCode> {
     let header = |spans: BTreeMap<String, ridge::Span>, cases: u64| {
         let (elements, base) = (args.elements, base.clone());
         let settings = ridge::Settings { elements, steady, base, spans, first: HELD_OUT_FROM, case: None };
+        settings.check_spans()?;
         Header::of(&ridge::KIND, &settings, cases)
     };
     // Looked at before anything is written.

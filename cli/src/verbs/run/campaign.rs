@@ -1,9 +1,10 @@
 //! `muprime run CAMPAIGN.toml`: the sessions of a campaign that are missing, then its page.
 
-use super::{Args, folder as folder_of, job_of, measure, serve};
+use super::{Args, folder as folder_of, job_of, measure, serve, watched};
 use crate::verbs::prelude::*;
 use runs::campaign::{self, Campaign};
 use runs::job::Job;
+use std::sync::atomic::Ordering;
 use studies::campaign::claims::Claim;
 
 /// The page of a campaign, in its folder.
@@ -26,6 +27,7 @@ pub fn run(mut args: Args, text: &str, folder: &Path, json: bool) -> miette::Res
         Some(_) => why,
         None => tables::check::refusal(why, &file, "campaign"),
     })?;
+    let is_named = args.out.is_some() || resumed.is_some();
     let (out, _made) = folder_of(args.out.take().or(resumed), &campaign.file.name)?;
     let given = args.clone();
     let job = |session: &campaign::CampaignRun| -> miette::Result<Job> {
@@ -43,10 +45,12 @@ pub fn run(mut args: Args, text: &str, folder: &Path, json: bool) -> miette::Res
     }
     campaign.open(&out, &job(&all[0])?.identity())?;
     serve(&mut args, &out.join("sessions"))?;
-    let mut whole = true;
-    for session in &all {
-        if campaign::is_complete(&out.join(&session.folder)) {
-            continue;
+    // One for all sessions: a stop between two of them is heard before the next one.
+    let (signals, mut whole) = (watched()?, true);
+    for session in all.iter().filter(|session| !campaign::is_complete(&out.join(&session.folder))) {
+        if signals.stops.load(Ordering::Relaxed) > 0 {
+            whole = false;
+            break;
         }
         let cell = &campaign.file.cell[session.cell];
         let job = job(session)?;
@@ -57,7 +61,7 @@ pub fn run(mut args: Args, text: &str, folder: &Path, json: bool) -> miette::Res
             say!("session {number} of {}, block {block}: {}{comma}{condition}", all.len(), cell.name);
         }
         let planned = job.points()?.len();
-        whole = measure(job, planned, &args, json)?;
+        whole = measure(job, planned, &args, &signals, json)?;
         if !whole || instruments {
             break;
         }
@@ -68,7 +72,10 @@ pub fn run(mut args: Args, text: &str, folder: &Path, json: bool) -> miette::Res
                 "folder": out, "sessions": made, "planned": all.len(), "claims": claims
             } }));
     } else {
-        tell(&claims, made, all.len(), &out);
+        // All options of this call: sessions in virtual and wall-clock time are not to be mixed.
+        let new_folder = (!is_named).then(|| format!("--out={}", out.display()));
+        let words = std::env::args().skip(1).chain(new_folder).map(quoted).collect::<Vec<_>>();
+        tell(&claims, made, all.len(), &out, &format!("muprime {}", words.join(" ")));
     }
     exit(if whole { DONE } else { FAILED })
 }
@@ -85,8 +92,8 @@ pub fn write(folder: &Path) -> miette::Result<(Vec<Claim>, usize, usize)> {
     Ok((claims, made.len(), campaign::sessions(&file).len()))
 }
 
-/// The answers for a person.
-pub fn tell(claims: &[Claim], made: usize, planned: usize, folder: &Path) {
+/// The answers for a person, and the command that makes what is missing.
+pub fn tell(claims: &[Claim], made: usize, planned: usize, folder: &Path, command: &str) {
     say!("{made} of {planned} sessions are complete");
     if claims.iter().any(|claim| claim.effect.is_some()) {
         say!(
@@ -101,7 +108,7 @@ pub fn tell(claims: &[Claim], made: usize, planned: usize, folder: &Path) {
         say!("{}: {} ({change})", claim.statement, claim.words());
     }
     if made < planned {
-        say!("to make the others, repeat the command: muprime run {}", quoted(folder.display()));
+        say!("to make the others, repeat the command: {command}");
     }
     say!("page: {}", folder.join(PAGE).display());
 }

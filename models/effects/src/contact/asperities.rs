@@ -77,8 +77,9 @@ pub fn mean_friction(c: &Contact) -> f64 {
         let (value, slope) = carried(depth);
         (value > load, depth - (value - load) / slope.max(1e-12))
     });
-    // Each asperity is a contact of its own under its own load; what belongs to the whole finger it has in its share.
-    let plain = !c.beyond_closed_form();
+    // Each asperity is a contact of its own under its own load; what belongs to the whole finger it has in
+    // its share.
+    let plain = c.adhesion == 0.0 && !c.needs_sweep();
     let unit = c.normal_stiffness * half;
     let one = |z: f64| {
         let own_depth = depth + z * spread;

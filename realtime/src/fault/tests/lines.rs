@@ -1,6 +1,7 @@
 //! Readings of a force on a faulty line.
 
 use super::*;
+use crate::ports::Channel;
 
 /// What the loop is shown of both axes in so many cycles, from a sensor with a new sample in each.
 fn shown(faults: &[Fault], seed: u64, cycles: u64) -> Vec<Forces> {

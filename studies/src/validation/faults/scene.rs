@@ -1,4 +1,5 @@
-//! One scene: a virtual rig, the real cycle, one or two faults, and what came of it. Everything from the seed.
+//! One scene: a virtual rig, the real cycle, one or two faults, and what came of it. Everything from the
+//! seed.
 
 use super::rows::{Expect, Moment, Pace, ROWS, TOO_LATE, What};
 use super::tamper::{Tamper, Tampered};
@@ -61,7 +62,8 @@ pub struct Scene {
     pub pace: Pace,
 }
 
-/// The core that a scene runs with: any but the sound one is a negative control, which the bench must find wrong.
+/// The core that a scene runs with: any but the sound one is a negative control, which the bench must find
+/// wrong.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Default)]
 pub enum Core {
     /// As it is.
@@ -302,7 +304,7 @@ pub fn run_with(scene: &Scene, keep: bool, core: Core) -> Found {
             for i in 0..ms {
                 let mut rig = world.rig();
                 rig.world.advance_to(time_of(cycle + i));
-                watch.alone(i, rig.world.truth().amplitude_pp_m);
+                watch.alone(i, rig.world.truth.amplitude_pp_m);
             }
             paused = ms;
             lateness = time_of(ms);
@@ -343,7 +345,7 @@ pub fn run_with(scene: &Scene, keep: bool, core: Core) -> Found {
                 heartbeat: cycle as u32 ^ 0x8000_0000,
             });
         }
-        let truth = world.rig().world.truth().amplitude_pp_m;
+        let truth = world.rig().world.truth.amplitude_pp_m;
         watch.row(cycle, &row, truth, shown.load(Ordering::Relaxed), paused);
         if keep {
             rows.push(row);
@@ -552,7 +554,8 @@ pub fn measured_bound(scene: &Scene) -> u64 {
     if has(|w| matches!(w, What::StopRefused | What::RogueMaster)) {
         // A fresh state must show it, ten cycles of patience, then the supply is cut.
         let state_age = scene.pace.timing(T, RING).amplifier.age_limit().0.div_ceil(T.0);
-        // States that are garbage say by turns that the output is on and that it is off: the first 'on' after that time counts.
+        // States that are garbage say by turns that the output is on and that it is off: the first 'on' after
+        // that time counts.
         let garbage =
             has(|w| matches!(w, What::Channel(realtime::fault::Target::Amplifier, FaultMode::Garbage, ..)));
         state_age + 10 + ring_cycles() + if garbage { 20 } else { 0 }
