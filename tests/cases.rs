@@ -306,15 +306,13 @@ fn a_study_whose_cases_all_fail_is_a_failure_and_a_variable_stated_twice_is_refu
     };
     std::fs::write(at("twice.csv"), "mu0,mu0\n0.4,0.5\n").unwrap();
     std::fs::write(at("once.csv"), "mu0\n0.4\n").unwrap();
-    std::fs::write(at("micro.csv"), "amplitude_pp_m\n2\n").unwrap();
-    let (twice, once, micro) = (at("twice.csv"), at("once.csv"), at("micro.csv"));
+    let (twice, once) = (at("twice.csv"), at("once.csv"));
     for wrong in [
         &["--draw", "3", "--span", "mu0=0.3..0.5", "--span", "mu0=0.4..0.6"][..],
         &["--draw", "3", "--span", "mu0=0.3..0.5", "--set", "mu0=0.4"],
         &["--draw", "3", "--span", "amplitude_pp_m=0.3..5"],
         &["--from", &twice],
         &["--from", &once, "--set", "mu0=0.5"],
-        &["--from", &micro],
     ] {
         let (status, document) = asked(&[&["cases", "ridge", "-o", &at("cases.jsonl")], wrong].concat());
         assert!(status == Some(2) && document["help"].is_string(), "{wrong:?}: {document}");

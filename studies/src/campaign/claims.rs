@@ -244,7 +244,7 @@ fn kinds(sessions: &[Measured]) -> Result<(Effect, String), String> {
 mod tests {
     use super::*;
 
-    /// It said that most passes lay beyond the range of the spring-slider.
+    /// Before, the words were that most passes lay beyond the range of the spring-slider.
     #[test]
     fn without_a_complete_session_every_statement_says_so() {
         let all = claims(&[], 0.02);

@@ -108,19 +108,14 @@ impl Settings {
         for (name, Span { low, high, .. }) in &self.spans {
             let shared = self.base.contains_key(name);
             miette::ensure!(!shared, help = "leave out one of the two", "{name} is in --set and in --span");
-            [low, high]
-                .into_iter()
-                .try_for_each(|end| checked(&self.base, &[(name.clone(), *end)].into()))?;
+            for end in [low, high] {
+                let case = set(set(RidgeCase::paper(), &self.base)?, &[(name.clone(), *end)].into())?;
+                let help = "state SI units: an amplitude of 2 um is 2e-6, in m peak-to-peak";
+                case.check().map_err(|why| miette::miette!(help = help, "--span {name}: {why}"))?;
+            }
         }
         Ok(())
     }
-}
-
-/// Refuses a case beyond what a ridge can have: what all share, and what it has of its own.
-pub fn checked(base: &BTreeMap<String, f64>, own: &BTreeMap<String, f64>) -> miette::Result<()> {
-    let help = "state SI units: an amplitude of 2 um is 2e-6, in m peak-to-peak";
-    let case = set(set(RidgeCase::paper(), base)?, own)?;
-    case.check().map_err(|why| miette::miette!(help = help, "{why}"))
 }
 
 /// Sets variables in the order of [`VARIABLES`].
