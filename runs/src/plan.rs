@@ -298,10 +298,11 @@ impl Plan {
             wrong.add(&["directions"], "directions are 1, -1 or both", remedy());
         }
         for (index, series) in file.series.iter().enumerate() {
-            let unnamed = |s: &Series| Series { name: String::new(), ..s.clone() };
-            if file.series[..index].iter().any(|before| unnamed(before) == unnamed(series)) {
+            // A designed experiment repeats conditions as passes with names of their own.
+            if file.series[..index].contains(series) {
                 let place = series.lists().iter().find_map(|(c, _)| series_place(text, index, c.name));
-                let remedy = "delete one of the two; `replicates` repeats every condition";
+                let remedy =
+                    "delete one of the two, or give them names; `replicates` repeats every condition";
                 wrong.add_at(place, "two series are the same", remedy.to_string());
             }
             if unknown(&series.directions) {

@@ -304,10 +304,12 @@ mod tests {
         let series = |name: &str| format!("[[series]]\nname = \"{name}\"\namplitude_pp_m = [1e-6, 2e-6]\n");
         let base = "name = \"p\"\n[base]\namplitude_pp_m = 2e-6\nfrequency_hz = 27500\nspeed_m_s = 0.02\n\
                     normal_force_n = 0.25\n";
-        let text = format!("{base}{}{}", series("a"), series("b"));
+        let text = format!("{base}{}{}", series("a"), series("a"));
         let why = Plan::parse("p", &text).unwrap_err();
         assert!(format!("{why:?}").contains("p:12:18") && why.help().is_some(), "{why:?}");
         Plan::parse("p", &format!("{text}edges = 1\n")).unwrap();
+        // As a designed experiment repeats a condition.
+        Plan::parse("p", &format!("{base}{}{}", series("a"), series("b"))).unwrap();
     }
 
     /// It had neither a place nor a remedy.
