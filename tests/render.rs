@@ -249,7 +249,7 @@ fn a_target_that_is_a_thousand_times_too_long_is_refused_and_one_pass_has_no_sca
         "{long}"
     );
     // One pass each way: a shift, and no scatter of it.
-    let job = of("-0.05,0.7\n0,0.9\n0.05,0.7\n", "bump");
+    let job = of("-0.05,0.7\n-0.005,0.7\n0,0.9\n0.005,0.7\n0.05,0.7\n", "bump");
     let out = job.out.clone();
     job.run_in_virtual_time(&Signals::default(), &mut |_| {}).unwrap();
     let group = &read(&out).unwrap().groups[0];
@@ -261,8 +261,15 @@ fn a_target_that_is_a_thousand_times_too_long_is_refused_and_one_pass_has_no_sca
     assert!(before.iter().all(|at| *at <= written("summary.json")), "{before:?}");
     std::fs::remove_file(out.join("fidelity.json")).unwrap();
     let said = tests::texts(&tests::muprime().arg("report").arg(&out).output().unwrap());
-    assert!(said.0.contains("rendered at"), "{said:?}");
+    assert!(said.1.contains("rendered at"), "{said:?}");
     assert_eq!(read(&out).unwrap().groups[0].passes, 2);
+    // A flat target was refused for its period of 0 um. It shows neither delay nor transfer function.
+    let job = of("-0.05,0.7\n0.05,0.7\n", "flat");
+    let out = job.out.clone();
+    job.run_in_virtual_time(&Signals::default(), &mut |_| {}).unwrap();
+    let group = &read(&out).unwrap().groups[0];
+    assert!(group.transfer.is_empty() && group.shift_missing.is_some(), "{group:?}");
+    assert!(out.join("report.html").is_file());
 }
 
 #[test]

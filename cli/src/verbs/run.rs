@@ -347,8 +347,8 @@ fn folder(named: Option<PathBuf>, plan: &str) -> miette::Result<(PathBuf, Made)>
     Ok((path, made))
 }
 
-/// The requests to a run or to all sessions of a campaign: each of [`rig::terminal::STOPS`] asks for a stop; a
-/// second one leaves within two seconds whatever happens.
+/// The requests to a run or to all sessions of a campaign: each of [`rig::terminal::STOPS`] asks for a
+/// stop; a second one leaves within two seconds whatever happens.
 fn watched() -> miette::Result<Signals> {
     let signals = Signals::default();
     let (stops, mut is_first) = (Arc::clone(&signals.stops), true);

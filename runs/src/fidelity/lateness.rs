@@ -50,10 +50,8 @@ const UP_TO_PERIODS: f64 = 0.45;
 const UP_TO_PASS: f64 = 0.25;
 /// Samples of a pass that are compared at most.
 const COMPARED: usize = 2000;
-/// Misfit on both sides of the best way, at least, beside that of the best.
+/// Misfit on both sides of the best way, at least, beside that of the best; 1e-12 is rounding.
 const SHOWN: f64 = 1.5;
-/// Mean square of `mu'` that is rounding.
-const ROUNDING: f64 = 1e-12;
 /// Coverage of the interval (three standard deviations of many passes), and cycles of the loop, by which a
 /// part that is slower than known exceeds it.
 const SURE: f64 = 0.9973;
@@ -104,7 +102,7 @@ impl Pair {
         let all: Vec<f64> = (-STEPS..=STEPS).map(of).collect();
         let best = (0..all.len()).min_by(|a, b| all[*a].total_cmp(&all[*b])).unwrap_or(0);
         let most = |values: &[f64]| values.iter().copied().fold(0.0, f64::max);
-        if most(&all[..best]).min(most(&all[best..])) <= SHOWN * all[best] + ROUNDING {
+        if most(&all[..best]).min(most(&all[best..])) <= SHOWN * all[best] + 1e-12 {
             return None;
         }
         let [a, b, c] = [all[best - 1], all[best], all[best + 1]];

@@ -35,7 +35,6 @@ fn demand(target: &Target, shortest_m: Option<f64>) -> Demand {
     let steps = target.mu_relative.windows(2).map(|v| (v[1] - v[0]).abs());
     let steepest_per_m = steps.fold(0.0, f64::max) / target.step_m;
     let sine = 0.5 * TAU * (range[1] - range[0]) / steepest_per_m.max(1e-12);
-    // A flat target has no period.
     let sine = if sine > 0.0 { sine } else { f64::INFINITY };
     Demand { range, steepest_per_m, period_m: shortest_m.unwrap_or(sine) }
 }

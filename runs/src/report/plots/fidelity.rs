@@ -24,6 +24,9 @@ pub fn over_position(places: &[Place], what: &str) -> miette::Result<String> {
 /// Gain from wanted to measured `mu'` against temporal frequency, a mark a group, beside the known dynamics.
 pub fn transfer(groups: &[Group]) -> miette::Result<String> {
     let bins = || groups.iter().flat_map(|g| &g.transfer);
+    if bins().next().is_none() {
+        return Ok(String::new());
+    }
     let places = Span::over(bins().map(|b| b.hz), true);
     let highest = bins().map(|b| b.gain + 2.0 * b.gain_sd).fold(1.1, f64::max).min(3.0);
     let y = (Span::linear(0.0..highest), "measured over wanted \u{3bc}'");
