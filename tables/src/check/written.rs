@@ -166,6 +166,6 @@ mod tests {
         let why = super::table(&path).err().unwrap();
         let problem = super::problems_of(&why).remove(0);
         let help = problem.help.unwrap_or_default();
-        assert!(problem.line == Some(3) && help.contains("own-law.md"), "{why:?}");
+        assert!(problem.line == Some(1) && help.contains("own-law.md"), "{why:?}");
     }
 }
