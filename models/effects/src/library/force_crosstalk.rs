@@ -20,7 +20,10 @@ pub(super) static EFFECT: Effect = Effect {
         .seen_by(CHECK, 0.001),
         Law::new("lateral into normal", &[Parameter::signed("crosstalk", "1", 0.08, -0.5, 0.5)])
             .certified_by(CertifiedKey::CrosstalkOntoNormal)
-            .seen_by("Pull along the plate with a known force and without load; read the normal axis.", 0.001),
+            .seen_by(
+                "Pull along the plate with a known force and without load; read the normal axis.",
+                0.001,
+            ),
     ],
     departs_by: 0.05,
     near: &["plate_tilt"],
