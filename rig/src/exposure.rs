@@ -164,35 +164,14 @@ impl Ledger {
             Book::open(folder, of, rest).wrap_err_with(|| format!("{why} ({})", folder.display()))
         };
         let books = known.iter().map(open).collect::<miette::Result<Vec<_>>>()?;
+        // Before anything is written: a refusal charges nobody.
+        books.iter().try_for_each(|book| book.has_time_left(limits))?;
         let mut ledger = Ledger { books, rest, strongest_m2_s2: strongest * strongest };
         let (_, now_ns) = machine_time().map_err(|e| miette::miette!("this machine tells no time: {e}"))?;
         let help = "give this user the right to write it";
         let written = ledger.write_ahead(now_ns);
         written.map_err(|e| miette::miette!(help = help, "the ledger cannot be written: {e}"))?;
         Ok(ledger)
-    }
-
-    /// Refuses a finger whose hour is used up: the rig would never be armed (SR-39, SR-40).
-    ///
-    /// # Errors
-    /// Which book says so, with its numbers and the limits.
-    pub fn has_time_left(&self, limits: &Limits) -> miette::Result<()> {
-        for book in &self.books {
-            let exposed = book.exposed();
-            let (left, (driven, dose)) = (Left::of(limits, &exposed), in_the_last_hour(&exposed));
-            if left.hour_s <= 0.0 || left.dose_m2_s <= 0.0 {
-                miette::bail!(
-                    help = "wait until enough of it is more than an hour ago; the amplifier counts for all subjects",
-                    "no human finger: '{}' was driven for {:.0} s of the last hour with a dose of {dose:.1} m2/s; {:.0} s \
-                     and {:.1} m2/s are allowed",
-                    book.entry.amplifier.trim_start_matches("person/"),
-                    driven,
-                    3600.0 * limits.exposure_duty_max,
-                    limits.exposure_dose_max_m2_s
-                );
-            }
-        }
-        Ok(())
     }
 
     /// What the loop takes over from earlier runs: in each part the worst of all books.
@@ -347,6 +326,22 @@ impl Book {
         let others = self.others.iter().map(|(_, entry)| entry.exposed(now_ns));
         let sum = |sum, other| joined(sum, other, Nanos::plus, |sum, dose| sum + dose);
         others.fold(self.entry.exposed(now_ns), sum)
+    }
+
+    /// Refuses a finger whose hour is used up: the rig would never be armed (SR-39, SR-40).
+    fn has_time_left(&self, limits: &Limits) -> miette::Result<()> {
+        let exposed = self.exposed();
+        let (left, (driven_s, dose)) = (Left::of(limits, &exposed), in_the_last_hour(&exposed));
+        miette::ensure!(
+            left.hour_s > 0.0 && left.dose_m2_s > 0.0,
+            help = "wait until enough of it is more than an hour ago; the amplifier counts for all subjects",
+            "no human finger: '{}' was driven for {driven_s:.0} s of the last hour with a dose of {dose:.1} m2/s; \
+             {:.0} s and {:.1} m2/s are allowed",
+            self.entry.amplifier.trim_start_matches("person/"),
+            3600.0 * limits.exposure_duty_max,
+            limits.exposure_dose_max_m2_s
+        );
+        Ok(())
     }
 
     fn write(&mut self, mut entry: Entry) -> io::Result<()> {

@@ -63,7 +63,6 @@ fn over_instruments(
     let _rig_lock = RigLock::take(&job.setup)?;
     let ledger = Ledger::open(&job.setup, &job.notes)?;
     if let Some(ledger) = &ledger {
-        ledger.has_time_left(&job.setup.config.limits)?;
         job.setup.config.exposed = ledger.exposed();
         sequence.exposure_left(Left::of(&job.setup.config.limits, &job.setup.config.exposed));
     }

@@ -5,7 +5,8 @@ use nalgebra::DMatrix;
 
 /// Parameters that are above zero by nature: data whose interval reaches zero do not determine them.
 const ABOVE_ZERO: &str = "gain resonance_hz quality_factor step.natural_frequency step.bandwidth step.damping_ratio \
-                          mount.resonance mount.damping_ratio creep.time_constant lateral.noise_sd normal.noise_sd orientation.weight";
+                          mount.resonance mount.damping_ratio creep.time_constant \
+                          lateral.noise_sd normal.noise_sd orientation.weight";
 
 /// Where, when and on what a certificate is to be used.
 #[derive(Clone, Debug, PartialEq)]

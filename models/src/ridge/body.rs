@@ -338,7 +338,7 @@ impl Body {
     }
 
     /// Stiffness-proportional damping of an elastic body: from now on its stress is that of the strain and
-    /// `beta_s` seconds times its rate. It stands in the place of the viscous arms, as an arm that forgets
+    /// `beta_s` seconds times its rate. It replaces the viscous arms, as an arm that forgets
     /// everything within a step. The hourglass control has none.
     pub fn damp_stiffness(&mut self, beta_s: f64) {
         if self.mesh.row_material.iter().any(|m| m.arm().is_some()) || beta_s <= 0.0 {

@@ -1,4 +1,4 @@
-//! Data that is unfit for a certificate is refused by the commands, with the place and the remedy.
+//! Commands refuse data that is unfit for a certificate, with place and remedy.
 
 use super::from_files;
 use std::f64::consts::PI;

@@ -74,7 +74,8 @@ pub fn run(mut args: Args, text: &str, folder: &Path, json: bool) -> miette::Res
     } else {
         // All options of this call: sessions in virtual and wall-clock time are not to be mixed.
         let new_folder = (!is_named).then(|| format!("--out={}", out.display()));
-        let words = std::env::args().skip(1).chain(new_folder).map(quoted).collect::<Vec<_>>();
+        let given = std::env::args_os().skip(1).map(|word| word.display().to_string());
+        let words = given.chain(new_folder).map(quoted).collect::<Vec<_>>();
         tell(&claims, made, all.len(), &out, &format!("muprime {}", words.join(" ")));
     }
     exit(if whole { DONE } else { FAILED })
