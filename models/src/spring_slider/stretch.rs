@@ -165,7 +165,8 @@ impl Stretch {
         let mut from = phi;
         for cut in cuts {
             let to = cut.min(end);
-            if to <= from {
+            // Within the look ahead that chose the piece, `g - line` is rounding alone.
+            if to <= from.max(phi + AHEAD_RAD) {
                 continue;
             }
             if ahead(to) < 0.0 {
@@ -208,5 +209,31 @@ impl Stretch {
             }
         };
         (0..n).map(value).collect()
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::Stretch;
+    use std::f64::consts::PI;
+
+    /// In full contact a finger that hardly moves has the stretch of the least limit, `h/a - 1`; so has a
+    /// skin that hardly recovers, however fast the plate. It was zero for growths of 1e-14 to 1e-9.
+    #[test]
+    fn the_slowest_stretch_in_full_contact_is_the_least_limit() {
+        let compression_ratio = 1.282;
+        let turn = |kappa, rho| {
+            let offset = compression_ratio;
+            Stretch { offset, alpha: PI, always_touching: true, kappa, rho }.steady().1
+        };
+        for exponent in -18..=-7 {
+            let kappa = 10f64.powi(exponent);
+            let mean = turn(kappa, f64::INFINITY).mean_force;
+            // The stretch grows by `kappa` over most of a turn.
+            assert!((mean - (compression_ratio - 1.0)).abs() < 1e-12 + 7.0 * kappa, "{kappa:e}: {mean}");
+            // What recovers slower than it grows stays at the limit's largest value that it met.
+            let slow = turn(0.1, kappa).mean_force;
+            assert!((slow - compression_ratio).abs() < 1e-3, "{kappa:e}: {slow}");
+        }
     }
 }
