@@ -14,6 +14,8 @@
 //! 40,0.3
 //! ```
 
+mod header;
+
 use crate::effect::{Effect, Law, Location, Parameter};
 use crate::library::{KNOWN, library};
 use models::condition::{Condition, OutOfDomain};
@@ -82,44 +84,43 @@ const ANSWERS: [&str; 4] = ["unknown", "no_gap", "named", "ambiguous"];
 /// A name that is not made of letters, digits and `_`, or one of the library; a table that is refused, with
 /// its line.
 pub fn own(name: &str, text: &str) -> Result<usize, String> {
+    // Spreadsheets put a byte-order mark before the first comment.
+    let text = text.trim_start_matches('\u{feff}');
     let plain = |c: char| c.is_ascii_lowercase() || c.is_ascii_digit() || c == '_';
-    if name.is_empty() || name.len() > LONGEST || !name.chars().all(plain) {
-        return Err(format!(
-            "'{name}' is not a name of an effect: rename the file to letters a to z, digits and _"
-        ));
-    }
-    if ANSWERS.contains(&name) {
-        return Err(format!("'{name}' is an answer of a verdict: rename the file"));
-    }
-    if KNOWN.iter().any(|e| e.name == name) {
-        return Err(format!("'{name}' is an effect of the library: rename the file"));
+    let is_name = !name.is_empty() && name.len() <= LONGEST && name.chars().all(plain);
+    for (refused, why) in [
+        (!is_name, "is not a name of an effect: rename the file to letters a to z, digits and _"),
+        (ANSWERS.contains(&name), "is an answer of a verdict: rename the file"),
+        (KNOWN.iter().any(|e| e.name == name), "is an effect of the library: rename the file"),
+    ] {
+        if refused {
+            return Err(format!("'{name}' {why}"));
+        }
     }
     let mut all = OWN.write().unwrap_or_else(PoisonError::into_inner);
     let same = |e: &&Effect| e.name == name && e.own.is_some_and(|own| own.text == text);
     if let Some(there) = all.iter().position(same) {
         return Ok(KNOWN.len() + there);
     }
-    let stated = |key: &str| {
-        let of =
-            |line: &'_ str| Some(line.strip_prefix('#')?.trim_start().strip_prefix(key)?.trim().to_string());
-        text.lines().take_while(|line| line.starts_with('#')).find_map(of)
+    let [place, summary, sd] = header::stated(text)?;
+    let refused =
+        |line: usize, what: String, needed: &str| Err(format!("line {line}: {what}: {needed} is needed"));
+    let (line, place) = place.unwrap_or((0, "contact"));
+    let Some(place) = Location::ALL.into_iter().find(|p| p.name() == place) else {
+        return refused(line, format!("place '{place}'"), "contact, finger, plate or instrument");
     };
-    let place = stated("place:").unwrap_or_else(|| "contact".into());
-    let nowhere = || format!("place '{place}': contact, finger, plate or instrument is needed");
-    let place = Location::ALL.into_iter().find(|p| p.name() == place).ok_or_else(nowhere)?;
-    let sd = stated("size_sd:")
-        .map_or(Ok(1.0), |text| text.parse::<f64>().map_err(|_| text))
-        .and_then(|sd| if sd > 0.0 && sd.is_finite() { Ok(sd) } else { Err(sd.to_string()) });
-    let sd = sd.map_err(|text| format!("size_sd '{text}': a number above zero is needed"))?;
+    let (line, stated_sd) = sd.unwrap_or((0, "1"));
+    let Some(sd) = stated_sd.parse().ok().filter(|sd| *sd > 0.0 && *sd < f64::INFINITY) else {
+        return refused(line, format!("size_sd '{stated_sd}'"), "a number above zero");
+    };
     let change = LawTable::answering(&CHANGE, text).map_err(|why| why.to_string())?;
     // For as long as the program runs: a diagnosis holds effects by reference, and a user's own are few.
     let size = Parameter::signed("size", "1", sd, -FARTHEST * sd, FARTHEST * sd);
-    let summary =
-        stated("summary:").unwrap_or_else(|| "Friction changes by a table of the user's own.".into());
+    let summary = summary.map_or("Friction changes by a table of the user's own.", |(_, summary)| summary);
     let effect = Effect {
         name: name.to_string().leak(),
         place,
-        summary: summary.leak(),
+        summary: summary.to_string().leak(),
         source: "a table of the user's own",
         laws: vec![Law::new("table", vec![size].leak())].leak(),
         own: Some(Box::leak(Box::new(OwnTable { text: text.to_string(), change }))),
@@ -136,4 +137,40 @@ pub fn by_name(name: &str) -> Option<&'static Effect> {
         all.iter().rev().copied().find(|effect| effect.name == name)
     };
     library().iter().copied().find(|effect| effect.name == name).or_else(own)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::{at, own};
+
+    const TABLE: &str = "speed_m_s,friction_change\n0.005,0\n0.08,0.3\n";
+
+    #[test]
+    fn a_byte_order_mark_changes_nothing() {
+        let text = format!("# place: finger\n# summary: Sweat.\n# size_sd: 0.1\n{TABLE}");
+        let plain = own("marked", &text).unwrap();
+        assert_eq!(own("marked", &format!("\u{feff}{text}")).unwrap(), plain);
+        let effect = at(plain);
+        assert_eq!((effect.place.name(), effect.summary), ("finger", "Sweat."));
+        assert!(!effect.own.unwrap().text.starts_with('\u{feff}'));
+        let other = own("marked_first", &format!("\u{feff}{text}")).unwrap();
+        assert_eq!((at(other).place.name(), at(other).summary), ("finger", "Sweat."));
+    }
+
+    #[test]
+    fn a_value_that_is_none_is_refused_with_its_line() {
+        for (head, part) in [
+            (
+                "# mine\n# place: skin\n",
+                "line 2: place 'skin': contact, finger, plate or instrument is needed",
+            ),
+            ("# size_sd: -1\n", "line 1: size_sd '-1': a number above zero is needed"),
+            ("\n# size_sd: NaN\n", "line 2: size_sd 'NaN'"),
+            ("# size_sd: inf\n", "line 1: size_sd 'inf'"),
+            ("# size_sd: small\n", "line 1: size_sd 'small'"),
+        ] {
+            let why = own("refused", &format!("{head}{TABLE}")).unwrap_err();
+            assert!(why.contains(part), "{head}: {why}");
+        }
+    }
 }

@@ -1,5 +1,6 @@
 //! The known name that a misspelt one is nearest to.
 
+pub use models::spelling::distance;
 use runs::input::unit_of;
 
 /// What to say of the known name that a misspelt one is nearest to.
@@ -22,20 +23,4 @@ pub fn nearest_of<'k>(name: &str, known: &[&'k str]) -> Option<&'k str> {
     let of = |k: &str| if k.starts_with(&format!("{name}_")) { 1 } else { distance(name, k) };
     let (distance, best) = known.iter().map(|k| (of(k), *k)).min()?;
     (distance <= 2.max(name.len() / 3)).then_some(best)
-}
-
-/// Letters to change, to add or to take away.
-pub fn distance(a: &str, b: &str) -> usize {
-    let b: Vec<char> = b.chars().collect();
-    let mut row: Vec<usize> = (0..=b.len()).collect();
-    for (i, x) in a.chars().enumerate() {
-        let mut corner = row[0];
-        row[0] = i + 1;
-        for (j, y) in b.iter().enumerate() {
-            let change = corner + usize::from(x != *y);
-            corner = row[j + 1];
-            row[j + 1] = change.min(row[j] + 1).min(corner + 1);
-        }
-    }
-    row[b.len()]
 }
