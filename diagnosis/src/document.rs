@@ -3,6 +3,7 @@
 use crate::certificates::{AtFault, InDoubt, at_fault, in_doubt};
 use crate::data::{self, Table};
 use crate::format::three_digits;
+use crate::predict::Forecast;
 use crate::unstated::Unstated;
 use crate::verdict::{Diagnosis, Report};
 use models::covariate::{COVARIATES, Covariate, Role};
@@ -37,7 +38,8 @@ pub fn document(result: &Diagnosis, rig: &RigFile, damage: &[String]) -> serde_j
     serde_json::to_string(&serde_json::to_value(whole)?)
 }
 
-/// What `--predictions` holds: CSV, a row a condition; empty cells where the base law cannot tell.
+/// What `--predictions` holds: CSV, a row a condition; empty cells where the base law, or the table of an
+/// effect in the verdict's model, cannot tell.
 ///
 /// # Errors
 /// A condition that lacks a column by which the verdict's model predicts.
@@ -47,12 +49,17 @@ pub fn predictions(result: &Diagnosis, conditions: &Table) -> Result<String, Uns
          lateral_force_in_run_n,lateral_force_in_run_sd_n\n",
     );
     for (point, f) in conditions.points.iter().zip(result.predict(conditions)?) {
-        let known = !f.baseline.is_nan();
-        let cells = [f.baseline, f.corrected, f.corrected_sd, f.in_run, f.in_run_sd];
-        let cells = cells.map(|c| if known { format!("{c:e}") } else { String::new() }).join(",");
-        text.push_str(&format!("{point},{cells}\n"));
+        text.push_str(&format!("{point},{}\n", cells(&f)));
     }
     Ok(text)
+}
+
+/// The cells of a prediction: none where there is no number, nor for the deviation of one that is none.
+fn cells(f: &Forecast) -> String {
+    let (corrected, in_run) = ([f.corrected, f.corrected_sd], [f.in_run, f.in_run_sd]);
+    let all = [[f.baseline; 2], [f.corrected; 2], corrected, [f.in_run; 2], in_run];
+    let known = |of: f64, value: f64| !(f.baseline + of + value).is_nan();
+    all.map(|[of, value]| if known(of, value) { format!("{value:e}") } else { String::new() }).join(",")
 }
 
 /// Share of a range beyond which a setting is outside it.
@@ -82,8 +89,31 @@ pub fn outside(table: &Table, conditions: &Table) -> Option<String> {
 
 #[cfg(test)]
 mod tests {
-    use super::outside;
+    use super::{cells, outside};
+    use crate::predict::Forecast;
     use crate::tests::{Deviates, table};
+
+    /// `NaN` stood in the cells beyond the table of an effect.
+    #[test]
+    fn what_cannot_be_told_is_an_empty_cell() {
+        let told = Forecast {
+            baseline: 0.1,
+            recalibrated: 0.1,
+            corrected: 0.2,
+            form: 0.2,
+            corrected_sd: 0.01,
+            scatter_sd: 0.01,
+            in_run: 0.25,
+            in_run_sd: 0.02,
+        };
+        assert_eq!(cells(&told), "1e-1,2e-1,1e-2,2.5e-1,2e-2");
+        // Beyond the table of an effect the law still tells; a deviation of no number is none.
+        let beyond = Forecast { corrected: f64::NAN, in_run: f64::NAN, ..told };
+        assert_eq!(cells(&beyond), "1e-1,,,,");
+        assert_eq!(cells(&Forecast { corrected_sd: f64::NAN, ..told }), "1e-1,2e-1,,2.5e-1,2e-2");
+        // A law that cannot tell is the base of all of them.
+        assert_eq!(cells(&Forecast { baseline: f64::NAN, ..told }), ",,,,");
+    }
 
     /// Conditions of the table are within it; a speed of ten times the largest is outside.
     #[test]
