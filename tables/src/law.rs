@@ -97,9 +97,21 @@ pub fn own_effects(files: &[std::path::PathBuf]) -> miette::Result<Vec<usize>> {
         let text = text_of(path)
             .map_err(|why| miette::miette!(help = "--effect takes a CSV or Parquet file", "{why}"))?
             .1;
-        effects::own(&name, &text).map_err(|why| miette::miette!("{}: {why}", path.display()))
+        let number =
+            effects::own(&name, &text).map_err(|why| miette::miette!("{}: {why}", path.display()))?;
+        Ok((name, number))
     };
-    let mut numbers: Vec<usize> = files.iter().map(one).collect::<miette::Result<_>>()?;
+    let all: Vec<(String, usize)> = files.iter().map(one).collect::<miette::Result<_>>()?;
+    for (k, (name, number)) in all.iter().enumerate() {
+        if let Some(other) = all[..k].iter().position(|(n, of)| n == name && of != number) {
+            let (files, help) = (
+                [other, k].map(|k| files[k].display()),
+                "rename one: each file's name is that of its effect",
+            );
+            miette::bail!(help = help, "{} and {} differ and are both '{name}'", files[0], files[1]);
+        }
+    }
+    let mut numbers: Vec<usize> = all.into_iter().map(|(_, number)| number).collect();
     numbers.sort_unstable();
     numbers.dedup();
     Ok(numbers)
@@ -160,4 +172,26 @@ pub fn grid_over(passes: &[Pass], names: &[String]) -> miette::Result<Vec<(Strin
         Ok((name.clone(), (0..count).map(node).collect()))
     };
     names.iter().map(one).collect()
+}
+
+#[cfg(test)]
+mod tests {
+    use super::own_effects;
+
+    #[test]
+    fn two_effects_of_one_name_are_refused_with_both_files() {
+        let folder = tempfile::tempdir().unwrap();
+        let file = |part: &str, change: f64| {
+            let path = folder.path().join(part).join("twin.csv");
+            std::fs::create_dir_all(path.parent().unwrap()).unwrap();
+            std::fs::write(&path, format!("speed_m_s,friction_change\n0.005,0\n0.08,{change}\n")).unwrap();
+            path
+        };
+        let [a, b, same] = [file("a", 0.3), file("b", 0.4), file("c", 0.3)];
+        assert_eq!(own_effects(&[a.clone(), same, a.clone()]).unwrap().len(), 1);
+        let why = own_effects(&[a.clone(), b.clone()]).unwrap_err();
+        let (said, help) = (why.to_string(), why.help().unwrap().to_string());
+        assert!(said.contains(&a.display().to_string()) && said.contains(&b.display().to_string()), "{said}");
+        assert!(said.contains("'twin'") && help.contains("rename"), "{said} {help}");
+    }
 }

@@ -172,6 +172,9 @@ pub(super) fn remedy(kind: Option<&str>) -> String {
         Some("law table") => {
             "docs/own-law.md lists the columns of a law table; `muprime model tabulate` makes one".into()
         }
+        Some("effect table") => {
+            "docs/own-law.md, 'An effect of your own', says what the table of an effect has".into()
+        }
         Some("record") => {
             "`muprime recover FILE` makes what is whole readable again, and keeps the original".into()
         }

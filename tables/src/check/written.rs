@@ -19,8 +19,9 @@ pub(super) fn table(path: &Path) -> miette::Result<Good> {
     let name = path.display().to_string();
     let text = std::str::from_utf8(&bytes).ok();
     let rows = text.map(runs::model_file::hashed).unwrap_or_default();
-    let has =
-        |column: &str| rows.lines().next().is_some_and(|head| head.split(',').any(|h| h.trim() == column));
+    let has = |column: &str| {
+        rows.lines().next().is_some_and(|head| head.split([',', ';', '\t']).any(|h| h.trim() == column))
+    };
     let good = |kind, passes| Good { kind, passes, remarks: Vec::new() };
     if let Some(text) = text.filter(|_| has(models::law_table::ANSWERS[0].0) && !has("point")) {
         let loaded = runs::model_file::load(&name, text);
@@ -28,7 +29,8 @@ pub(super) fn table(path: &Path) -> miette::Result<Good> {
         return Ok(good("law table", None));
     }
     if has(effects::own::COLUMN) {
-        crate::law::own_effects(&[path.to_path_buf()])?;
+        crate::law::own_effects(&[path.to_path_buf()])
+            .map_err(|why| place::with_place_and_help(why, &name, Some("effect table")))?;
         return Ok(good("effect table", None));
     }
     let passes = super::cells::passes(&name, &bytes)?;
@@ -167,5 +169,25 @@ mod tests {
         let problem = super::problems_of(&why).remove(0);
         let help = problem.help.unwrap_or_default();
         assert!(problem.line == Some(1) && help.contains("own-law.md"), "{why:?}");
+    }
+
+    /// It was helped as a point table.
+    #[test]
+    fn a_faulty_effect_table_is_helped_as_one() {
+        let folder = tempfile::tempdir().unwrap();
+        let path = folder.path().join("sweat.csv");
+        for (text, line) in [
+            ("# place: skin\nspeed_m_s,friction_change\n0.005,0\n", 1),
+            ("speed_m_s,friction_change\n0.005,0\n0.005,0.2\n", 1),
+            ("# c\nspeed_m_s;friction_change\n0,005;0\n", 2),
+        ] {
+            std::fs::write(&path, text).unwrap();
+            let problem = super::problems_of(&super::table(&path).err().unwrap()).remove(0);
+            let help = problem.help.unwrap_or_default();
+            assert!(
+                problem.line == Some(line) && help.contains("own-law.md") && !help.contains("import"),
+                "{help}"
+            );
+        }
     }
 }
