@@ -170,12 +170,19 @@ impl LawTable {
         let mut reader = builder.trim(csv::Trim::All).comment(Some(b'#')).from_reader(text.as_bytes());
         let malformed = |e: csv::Error| {
             let line = e.position().map_or(1, csv::Position::line);
-            bad(line, "the row has another number of cells than the header", "complete it or remove it")
+            let remedy = "complete it or remove it; a number has a decimal point, not a comma";
+            bad(line, "the row has another number of cells than the header", remedy)
         };
         let header = reader.headers().map_err(malformed)?.clone();
         // The reader counts comments before the header as part of it.
         let blank = |line: &&str| line.trim().is_empty() || line.starts_with('#');
         let head = 1 + text.lines().take_while(blank).count() as u64;
+        if let Some(cells) = header.get(0).filter(|cells| header.len() == 1 && cells.contains([';', '\t'])) {
+            let by = if cells.contains(';') { "semicolons" } else { "tabs" };
+            let remedy =
+                "separate them by commas, and give numbers a decimal point in place of a decimal comma";
+            return Err(bad(head, format!("its columns are separated by {by}"), remedy));
+        }
         let columns = header.iter().map(|name| column(of, name, head)).collect::<Result<Vec<_>, _>>()?;
         if let Some(twice) = (1..header.len()).find(|&i| header.iter().take(i).any(|h| h == &header[i])) {
             return Err(bad(head, format!("two columns are '{}'", &header[twice]), "remove one"));

@@ -62,6 +62,7 @@ pub fn load_for(setup: &Setup, name: &str, text: &str) -> miette::Result<Arc<dyn
 
 /// The law of a file for a finger, with the errors of [`load`]. Its name is that of the file.
 pub fn law(finger: &Finger, name: &str, text: &str) -> miette::Result<Arc<dyn FrictionModel>> {
+    let text = text.trim_start_matches('\u{feff}');
     let stem = Path::new(name).file_stem().map_or(name.into(), |s| s.to_string_lossy());
     let refused = |why: String| miette::miette!("{name}: {why}");
     if text.starts_with("muprime ridge table") {
@@ -94,9 +95,11 @@ pub fn hashed(table: &str) -> String {
 
 /// Whether a text is none of a law table, a ridge table and a surrogate: then it is to be a MODEL.toml.
 pub(crate) fn is_corrected(text: &str) -> bool {
+    let text = text.trim_start_matches('\u{feff}');
     let rows = hashed(text);
     let head = rows.lines().find(|line| !line.trim().is_empty()).unwrap_or_default();
-    let table = head.contains(',') && !head.contains('=') || head.trim() == ANSWERS[0].0;
+    let cells = head.trim().contains([',', ';', '\t']) && !head.contains('=');
+    let table = cells && !head.starts_with('[') || head.trim() == ANSWERS[0].0;
     !table && !text.starts_with("muprime ridge table") && !text.trim_start().starts_with('{')
 }
 
@@ -116,4 +119,34 @@ fn compiled(finger: &Finger, name: &str, text: &str) -> miette::Result<Corrected
         })?),
     };
     Corrected::compile_on(&saved, base).map_err(|e| miette::miette!("{name}: {e}"))
+}
+
+#[cfg(test)]
+mod tests {
+    use super::{HASH_MARK, load};
+
+    fn refusal(text: &str) -> String {
+        load("law.csv", text).err().map(|why| why.to_string()).unwrap_or_default()
+    }
+
+    /// It was refused as a TOML file.
+    #[test]
+    fn a_law_table_with_semicolons_is_refused_as_one() {
+        let why = refusal("# mine\namplitude_pp_m;mu_relative\n0;1\n2e-6;0,3\n");
+        assert!(
+            why.contains("line 2") && why.contains("semicolons") && why.contains("decimal comma"),
+            "{why}"
+        );
+    }
+
+    /// The mark of a hash on the first line was not seen behind a byte-order mark.
+    #[test]
+    fn a_byte_order_mark_hides_no_hash() {
+        let table = format!("{HASH_MARK}00\namplitude_pp_m,mu_relative\n0,1\n2e-6,0.3\n");
+        for text in [table.clone(), format!("\u{feff}{table}")] {
+            assert!(refusal(&text).contains("was changed after it was tabulated"));
+        }
+        assert!(!super::is_corrected("\u{feff}{}") && !super::is_corrected("\u{feff}muprime ridge table"));
+        load("table.txt", &format!("\u{feff}{}", models::surrogate::DEFAULT_TABLE)).map(drop).unwrap();
+    }
 }

@@ -145,7 +145,8 @@ fn named(given: &[PathBuf], list: Option<&Path>) -> miette::Result<Vec<PathBuf>>
     if let Some(list) = list {
         let bytes = runs::input::bytes_of(list, runs::input::MAX_TABLE_BYTES)?;
         let text = String::from_utf8(bytes).into_diagnostic().wrap_err_with(|| list.display().to_string())?;
-        all.extend(text.lines().map(str::trim).filter(|l| !l.is_empty()).map(PathBuf::from));
+        let lines = text.trim_start_matches('\u{feff}').lines().map(str::trim);
+        all.extend(lines.filter(|l| !l.is_empty()).map(PathBuf::from));
     }
     if all.is_empty() {
         miette::bail!("no files: name them, or a file that lists them with --list");
@@ -272,5 +273,19 @@ pub fn run(args: Args, json: bool) -> miette::Result<ExitCode> {
             write("finger", &a.to, 0, &settings, Some(&lines), json)
         }
         What::Noop(a) => write("noop", &a.to, a.cases, &a.settings, None, json),
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::named;
+
+    /// The first file of such a list was not found.
+    #[test]
+    fn a_byte_order_mark_is_no_part_of_a_list() {
+        let folder = tempfile::tempdir().unwrap();
+        let (list, run) = (folder.path().join("list.txt"), folder.path().canonicalize().unwrap());
+        std::fs::write(&list, format!("\u{feff}{}\n", run.display())).unwrap();
+        assert_eq!(named(&[], Some(&list)).unwrap(), [run]);
     }
 }

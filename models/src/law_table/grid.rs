@@ -78,7 +78,7 @@ impl Grid {
             sorted.push((variable, nodes.clone()));
         }
         if let Some((name, _)) = axes.iter().find(|a| Variable::by_name(a.0).is_none()) {
-            let names: Vec<_> = super::VARIABLES.iter().map(|v| v.name).collect();
+            let names: Vec<_> = super::VARIABLES[..super::OF_LAWS].iter().map(|v| v.name).collect();
             return Err(format!("grid: no variable '{name}'; there are {}", names.join(", ")));
         }
         let size = sorted.iter().map(|a| a.1.len()).fold(1, usize::saturating_mul);

@@ -43,6 +43,12 @@ fn wrong_tables_are_refused_with_line_and_remedy() {
     let full = "1e-6,0.01,0.5\n1e-6,0.02,0.6\n2e-6,0.01,0.3\n";
     for (text, parts) in [
         ("amplitude_um,mu_relative\n1,0.5\n".to_string(), ["line 1", "'amplitude_um'", "amplitude_pp_m"]),
+        (
+            "# c\nspeed_m_s;mu_relative\n0,1;1\n".into(),
+            ["line 2", "separated by semicolons", "decimal comma"],
+        ),
+        ("speed_m_s\tmu_relative\n0.1\t1\n".into(), ["line 1", "separated by tabs", "commas"]),
+        (format!("{HEAD}\n1e-6,0,01,0,5\n"), ["line 2", "number of cells", "not a comma"]),
         ("speed_m_s,speed_m_s,mu_relative\n".into(), ["line 1", "two columns", "remove one"]),
         ("# c\nspeed_m_s\n0.1\n".into(), ["line 2", "'mu_relative' is missing", "add it"]),
         ("mu_relative\n0.1\n".into(), ["line 1", "no column is a variable", "add"]),
@@ -110,4 +116,11 @@ fn a_grid_names_its_places_and_measures_its_error() {
     let mut wrong = answers(0);
     wrong[3][0] = f64::NAN;
     assert!(grid.table(0, &wrong).unwrap_err().contains("mu_relative is NaN at amplitude_pp_m = 1.0000e-6"));
+}
+
+/// It listed variables of effects, which a law cannot have.
+#[test]
+fn a_grid_names_the_variables_of_laws() {
+    let why = Grid::parse(["temperature_c=20..30:3"]).unwrap_err();
+    assert!(why.ends_with("there are amplitude_pp_m, frequency_hz, speed_m_s, normal_force_n, mu0"), "{why}");
 }
