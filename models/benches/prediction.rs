@@ -126,12 +126,3 @@ fn inverse_law_table(bencher: divan::Bencher) {
 fn contact_angle(bencher: divan::Bencher) {
     bencher.bench_local(|| half_contact_angle_rad(black_box(0.064)));
 }
-
-/// The same root by the bracketing method, which needs no derivative.
-#[divan::bench]
-fn contact_angle_bracketed(bencher: divan::Bencher) {
-    bencher.bench_local(|| {
-        let target = PI * black_box(0.064);
-        muprime_models::root::bracketed(|a| a.sin() - a * a.cos() - target, 0.0, PI)
-    });
-}

@@ -6,6 +6,7 @@
 //! size.
 
 use crate::setup::Setup;
+use models::root::bisection;
 use models::target::Feedback;
 use serde::{Deserialize, Serialize};
 use std::f64::consts::PI;
@@ -88,8 +89,7 @@ impl Dynamics {
     /// The frequency in Hz at which `gain` has fallen to 0.707; none below half the loop's rate.
     fn corner(&self, gain: impl Fn(f64) -> f64) -> Option<f64> {
         let nyquist = 0.5 / self.cycle_s;
-        (gain(nyquist) < HALF_POWER)
-            .then(|| models::root::bracketed(|hz| gain(hz) - HALF_POWER, 0.0, nyquist))
+        (gain(nyquist) < HALF_POWER).then(|| bisection([0.0, nyquist], 64, |hz| gain(hz) > HALF_POWER))
     }
 
     /// The frequency in Hz where rendering ends: -3 dB of all parts.
@@ -148,9 +148,8 @@ impl Dynamics {
             (p.hypot(i) * self.gain(hz), i.atan2(p) + self.lag(hz))
         };
         let nyquist = 0.5 / self.cycle_s;
-        let crossing = |f: &dyn Fn(f64) -> f64| models::root::bracketed(f, 1e-3, nyquist);
-        let crossover = crossing(&|hz| of(hz).0 - 1.0);
-        let turned = crossing(&|hz| of(hz).1 - PI);
+        let crossover = bisection([1e-3, nyquist], 64, |hz| of(hz).0 > 1.0);
+        let turned = bisection([1e-3, nyquist], 64, |hz| of(hz).1 < PI);
         [(PI - of(crossover).1).to_degrees(), 1.0 / of(turned).0]
     }
 
