@@ -146,8 +146,8 @@ pub fn plain(error: &str) -> String {
         text.trim_start_matches(|c: char| c.is_whitespace() || c == '│')
     }
     const SENTENCES: [(&str, &str); 4] = [
-        ("invalid digit found in string", "a whole number is expected"),
-        ("cannot parse integer from empty string", "a whole number is expected"),
+        ("invalid digit found in string", "a whole number, 0 or more, is expected"),
+        ("cannot parse integer from empty string", "a whole number, 0 or more, is expected"),
         ("number too large to fit in target type", "the number is too large"),
         ("invalid float literal", "a number is expected"),
     ];

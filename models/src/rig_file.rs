@@ -320,7 +320,7 @@ impl RigFile {
 }
 
 /// Stiffness of anything that a plate can rub against, N/m: fingertips have 1e3 (slow) to 1e7 (ultrasonic).
-const STIFFNESS_N_PER_M: [f64; 2] = [1e2, 1e10];
+pub const STIFFNESS_N_PER_M: [f64; 2] = [1e2, 1e10];
 /// Largest relative uncertainty of a stiffness: beyond a factor of seven either way nothing is known of it.
 const STIFFNESS_RELATIVE_SD_MAX: f64 = 2.0;
 /// Young's modulus in Pa: from gels to diamond.

@@ -1,6 +1,6 @@
 //! `muprime model amplitude-for`: the amplitude for a wanted friction.
 
-use super::conditions::ConditionArgs;
+use super::conditions::{ConditionArgs, YOUNG_MODULUS_PA};
 use super::refused;
 use crate::verbs::prelude::*;
 use clap::Args;
@@ -10,7 +10,7 @@ use models::quantity::PeakToPeak;
 use models::surrogate::Surrogate;
 use runs::human::{number, quantity, to_its_uncertainty};
 
-/// Arguments of `muprime model amplitude-for`. The amplitude flag is the largest that may be used.
+/// Arguments of `muprime model amplitude-for`.
 #[derive(Args)]
 pub struct AmplitudeForArgs {
     /// Wanted relative friction, 0 to 1
@@ -29,14 +29,31 @@ pub struct AmplitudeForArgs {
     condition: ConditionArgs,
 }
 
+impl AmplitudeForArgs {
+    /// The wanted mu'; the words of a refusal.
+    fn wanted(&self) -> Result<f64, String> {
+        self.condition.check(&[("young_modulus_pa", self.young_modulus_pa, YOUNG_MODULUS_PA)])?;
+        let condition = self.condition.condition();
+        let greatest = condition.mu0 * condition.normal_force_n;
+        match self.lateral_force_n {
+            _ if self.condition.amplitude_pp_m.is_some() => {
+                Err("--amplitude-pp-m is the answer; --largest-amplitude-pp-m bounds it".into())
+            }
+            Some(force) if greatest > 0.0 && !(force > 0.0 && force <= greatest) => {
+                let most = quantity(greatest, "N");
+                Err(format!(
+                    "--lateral-force-n {force}: give more than 0 and at most {most} (mu0 times normal force)"
+                ))
+            }
+            force => Ok(force.map(|force| force / greatest).or(self.mu_relative).unwrap_or(f64::NAN)),
+        }
+    }
+}
+
 /// Answers; an amplitude out of reach is a failure (1), nonsense is refused (2).
 pub fn run(args: &AmplitudeForArgs, json: bool) -> miette::Result<ExitCode> {
-    args.condition.check().map_err(refused)?;
+    let wanted = args.wanted().map_err(refused)?;
     let condition = args.condition.condition();
-    let coulomb = condition.mu0 * condition.normal_force_n;
-    let Some(wanted) = args.mu_relative.or(args.lateral_force_n.map(|force| force / coulomb)) else {
-        miette::bail!("--mu-relative or --lateral-force-n is needed");
-    };
     if !(args.largest_amplitude_pp_m > 0.0 && args.largest_amplitude_pp_m <= 50e-6) {
         miette::bail!("--largest-amplitude-pp-m {}: above 0 and at most 50e-6", args.largest_amplitude_pp_m);
     }
@@ -80,4 +97,31 @@ pub fn run(args: &AmplitudeForArgs, json: bool) -> miette::Result<ExitCode> {
         );
     }
     Ok(ExitCode::SUCCESS)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use clap::Parser;
+
+    #[derive(Parser)]
+    struct Flags {
+        #[command(flatten)]
+        args: AmplitudeForArgs,
+    }
+
+    /// The refusal spoke of a mu_relative that nobody had given; an amplitude was taken and changed nothing.
+    #[test]
+    fn a_force_beyond_coulombs_and_an_amplitude_are_refused_by_their_options() {
+        let wanted = |words: &[&str]| Flags::parse_from([&["mu"], words].concat()).args.wanted();
+        for force in ["50", "0", "-0.1", "NaN"] {
+            let why = wanted(&[&format!("--lateral-force-n={force}")]).unwrap_err();
+            assert!(why.starts_with(&format!("--lateral-force-n {force}: ")), "{why}");
+            assert!(why.contains("at most 0.125 N (mu0 times"), "{why}");
+        }
+        assert_eq!(wanted(&["--lateral-force-n", "0.125"]), Ok(1.0));
+        assert_eq!(wanted(&["--mu-relative", "0.4"]), Ok(0.4));
+        let why = wanted(&["--mu-relative", "0.4", "--amplitude-pp-m", "1e-6"]).unwrap_err();
+        assert!(why.contains("--largest-amplitude-pp-m"), "{why}");
+    }
 }

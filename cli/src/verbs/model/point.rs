@@ -1,6 +1,6 @@
 //! `muprime model point`: one condition through a law that answers at once.
 
-use super::conditions::ConditionArgs;
+use super::conditions::{ConditionArgs, YOUNG_MODULUS_PA};
 use super::refused;
 use crate::verbs::prelude::*;
 use clap::Args;
@@ -11,6 +11,7 @@ use models::law::BuiltIn;
 use models::prediction::EmpiricalPsi;
 use models::psi::{PsiEq16, PsiEq17};
 use models::reading::Reading;
+use models::rig_file::STIFFNESS_N_PER_M;
 use models::spring_slider;
 use models::surrogate::Surrogate;
 use runs::human::quantity;
@@ -30,18 +31,57 @@ pub struct PointArgs {
     /// Which law
     #[arg(long, value_parser = law(), default_value = "spring-slider")]
     model: BuiltIn,
-    /// Normal stiffness of the finger in N/m
-    #[arg(long, default_value_t = 3.9e6, allow_negative_numbers = true)]
-    normal_stiffness_n_per_m: f64,
-    /// Lateral stiffness of the finger in N/m
-    #[arg(long, default_value_t = 1.5e6, allow_negative_numbers = true)]
-    lateral_stiffness_n_per_m: f64,
-    /// Speed of the skin's lateral recovery in m/s (infinite if left out)
-    #[arg(long, allow_negative_numbers = true)]
+    /// Normal stiffness of the finger in N/m (spring-slider; 3.9e6 if left out)
+    #[arg(long)]
+    normal_stiffness_n_per_m: Option<f64>,
+    /// Lateral stiffness of the finger in N/m (spring-slider; 1.5e6 if left out)
+    #[arg(long)]
+    lateral_stiffness_n_per_m: Option<f64>,
+    /// Speed of the skin's lateral recovery in m/s (spring-slider; infinite if left out)
+    #[arg(long)]
     lateral_recovery_m_per_s: Option<f64>,
-    /// Young's modulus of the stratum corneum in Pa (surrogate)
-    #[arg(long, default_value_t = 28.3e6, allow_negative_numbers = true)]
-    young_modulus_pa: f64,
+    /// Young's modulus of the stratum corneum in Pa (surrogate; 28.3e6 if left out)
+    #[arg(long)]
+    young_modulus_pa: Option<f64>,
+}
+
+impl PointArgs {
+    /// The finger that the law takes; refused are values that it does not depend on, or that no finger has.
+    fn finger(&self) -> Result<Finger, String> {
+        let (paper, recovery) = (Finger::paper(), self.lateral_recovery_m_per_s);
+        let options = [
+            ("normal_stiffness_n_per_m", self.normal_stiffness_n_per_m, BuiltIn::SpringSlider),
+            ("lateral_stiffness_n_per_m", self.lateral_stiffness_n_per_m, BuiltIn::SpringSlider),
+            ("lateral_recovery_m_per_s", recovery, BuiltIn::SpringSlider),
+            ("young_modulus_pa", self.young_modulus_pa, BuiltIn::Surrogate),
+            ("poisson_ratio", None, BuiltIn::Psi),
+        ];
+        let flags = |all: &[(&str, Option<f64>, BuiltIn)]| {
+            let flag = |(key, ..): &(&str, _, _)| format!("--{}", key.replace('_', "-"));
+            all.iter().map(flag).collect::<Vec<_>>().join(", ")
+        };
+        let (own, other): (Vec<_>, Vec<_>) = options.into_iter().partition(|(.., law)| *law == self.model);
+        if let Some(given) = other.iter().find(|(_, value, _)| value.is_some()) {
+            let (given, own, law) = (flags(&[*given]), flags(&own), self.model.name());
+            return Err(format!("{given}: the law '{law}' does not depend on it; it takes {own}"));
+        }
+        let modulus = self.young_modulus_pa.or(paper.young_modulus_pa);
+        let k_n = self.normal_stiffness_n_per_m.unwrap_or(paper.normal_stiffness_n_per_m);
+        let k_l = self.lateral_stiffness_n_per_m.unwrap_or(paper.lateral_stiffness_n_per_m);
+        self.condition.check(&[
+            (options[0].0, k_n, STIFFNESS_N_PER_M),
+            (options[1].0, k_l, STIFFNESS_N_PER_M),
+            (options[3].0, modulus.unwrap_or(f64::NAN), YOUNG_MODULUS_PA),
+        ])?;
+        Ok(Finger {
+            normal_stiffness_n_per_m: k_n,
+            lateral_stiffness_n_per_m: k_l,
+            poisson_ratio: self.condition.poisson_ratio,
+            young_modulus_pa: modulus,
+            lateral_recovery_m_per_s: recovery.filter(|v| v.is_nan() || *v < f64::INFINITY),
+            ..paper
+        })
+    }
 }
 
 /// The law under one reading.
@@ -76,16 +116,8 @@ struct Answer {
 
 /// Answers, or refuses a condition outside the law's domain.
 pub fn run(args: &PointArgs, json: bool) -> miette::Result<ExitCode> {
-    args.condition.check().map_err(refused)?;
+    let finger = args.finger().map_err(refused)?;
     let condition = args.condition.condition();
-    let finger = Finger {
-        normal_stiffness_n_per_m: args.normal_stiffness_n_per_m,
-        lateral_stiffness_n_per_m: args.lateral_stiffness_n_per_m,
-        poisson_ratio: args.condition.poisson_ratio,
-        young_modulus_pa: Some(args.young_modulus_pa),
-        lateral_recovery_m_per_s: args.lateral_recovery_m_per_s.filter(|v| v.is_nan() || *v < f64::INFINITY),
-        ..Finger::paper()
-    };
     let cycle = spring_slider::solve(&condition, &finger).map_err(refused)?;
     let law = args.model.law(&finger).map_err(refused)?;
     let mut readings = Vec::new();
@@ -115,7 +147,8 @@ pub fn run(args: &PointArgs, json: bool) -> miette::Result<ExitCode> {
     };
     if args.model == BuiltIn::Surrogate {
         let Condition { amplitude, frequency_hz, speed_m_s, normal_force_n, mu0, .. } = condition;
-        let (surrogate, modulus_pa) = (Surrogate::shipped().into_diagnostic()?, args.young_modulus_pa);
+        let surrogate = Surrogate::shipped().into_diagnostic()?;
+        let modulus_pa = finger.young_modulus_pa.unwrap_or_default();
         let at = surrogate.at(amplitude, frequency_hz, speed_m_s / mu0, normal_force_n, modulus_pa);
         answer.contact_fraction = at.contact_fraction;
         answer.phase_shift_deg = at.phase_shift_deg.rem_euclid(360.0);
@@ -143,4 +176,43 @@ pub fn run(args: &PointArgs, json: bool) -> miette::Result<ExitCode> {
         }
     }
     Ok(ExitCode::SUCCESS)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use clap::Parser;
+
+    #[derive(Parser)]
+    struct Flags {
+        #[command(flatten)]
+        point: PointArgs,
+    }
+
+    /// Such an option was taken and changed nothing.
+    #[test]
+    fn what_a_law_does_not_depend_on_is_refused() {
+        let finger = |model: &str, flag: &str| {
+            let words = ["mu", "--model", model, flag, "2e6"];
+            Flags::parse_from(words).point.finger()
+        };
+        let (k_n, modulus) = ("--normal-stiffness-n-per-m", "--young-modulus-pa");
+        let (k_l, recovery) = ("--lateral-stiffness-n-per-m", "--lateral-recovery-m-per-s");
+        for (model, flags, takes) in [
+            ("spring-slider", &[modulus][..], "-per-m, --lateral-recovery-m-per-s"),
+            ("psi", &[k_n, k_l, recovery, modulus], "it takes --poisson-ratio"),
+            ("surrogate", &[k_n, k_l, recovery], "it takes --young-modulus-pa"),
+        ] {
+            for flag in [k_n, k_l, recovery, modulus] {
+                match finger(model, flag) {
+                    Err(why) => assert!(
+                        flags.contains(&flag) && why.starts_with(flag) && why.contains(takes),
+                        "{why}"
+                    ),
+                    Ok(_) => assert!(!flags.contains(&flag), "{model} {flag}"),
+                }
+            }
+        }
+        assert_eq!(Flags::parse_from(["mu"]).point.finger(), Ok(Finger::paper()));
+    }
 }

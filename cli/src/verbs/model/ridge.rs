@@ -29,21 +29,21 @@ pub struct RidgeArgs {
     #[command(flatten)]
     condition: ConditionArgs,
     /// Young's modulus of the stratum corneum in Pa
-    #[arg(long, default_value_t = 28.3e6, allow_negative_numbers = true)]
+    #[arg(long, default_value_t = 28.3e6)]
     young_modulus_pa: f64,
     /// Retardation time of the tissue in s (0: elastic)
-    #[arg(long, default_value_t = 0.0, allow_negative_numbers = true)]
+    #[arg(long, default_value_t = 0.0)]
     retardation_time_s: f64,
     #[command(flatten)]
     contact: ContactArgs,
     /// Mean pressure of the gross contact in Pa (from the force, by Hertz, if left out)
-    #[arg(long, allow_negative_numbers = true)]
+    #[arg(long)]
     mean_pressure_pa: Option<f64>,
     /// Mass damping in 1/s
-    #[arg(long, default_value_t = case::MASS_DAMPING_PER_S, allow_negative_numbers = true)]
+    #[arg(long, default_value_t = case::MASS_DAMPING_PER_S)]
     mass_damping_per_s: f64,
     /// Stiffness-proportional damping in s (needs far smaller steps)
-    #[arg(long, default_value_t = 0.0, allow_negative_numbers = true)]
+    #[arg(long, default_value_t = 0.0)]
     stiffness_damping_s: f64,
     /// Run it a second time, down from twice the amplitude, and say whether the answer depends on the start
     #[arg(long)]
@@ -52,7 +52,7 @@ pub struct RidgeArgs {
     #[arg(long, default_value_t = case::ELEMENTS)]
     elements: usize,
     /// Time step in s (the largest stable one if left out; an unstable one is refused)
-    #[arg(long, allow_negative_numbers = true)]
+    #[arg(long)]
     time_step_s: Option<f64>,
     /// Tolerance on mu' at which the cycles count as steady
     #[arg(long, default_value_t = 0.004)]
@@ -116,7 +116,7 @@ fn partial(mu: &[f64], cycles: u64, json: bool) {
 
 /// Runs the case; refuses bad input, and fails with a reason where the run diverged.
 pub fn run(args: &RidgeArgs, json: bool) -> miette::Result<ExitCode> {
-    args.condition.check().map_err(refused)?;
+    args.condition.check(&[]).map_err(refused)?;
     let case = args.case();
     let mut settings = RunSettings { step_s: args.time_step_s, ..RunSettings::default() };
     settings.steady.tolerance = args.tolerance;

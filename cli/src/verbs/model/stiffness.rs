@@ -17,13 +17,13 @@ pub struct StiffnessArgs {
     #[arg(long)]
     elements: Option<usize>,
     /// Mean pressure at 0.25 N in Pa
-    #[arg(long, default_value_t = case::MEAN_PRESSURE_AT_QUARTER_NEWTON_PA, allow_negative_numbers = true)]
+    #[arg(long, default_value_t = case::MEAN_PRESSURE_AT_QUARTER_NEWTON_PA)]
     mean_pressure_pa: f64,
     /// Poisson's ratio of the skin
-    #[arg(long, default_value_t = 0.33, allow_negative_numbers = true)]
+    #[arg(long, default_value_t = 0.33)]
     poisson_ratio: f64,
     /// Young's modulus of the stratum corneum in Pa
-    #[arg(long, default_value_t = 28.3e6, allow_negative_numbers = true)]
+    #[arg(long, default_value_t = 28.3e6)]
     young_modulus_pa: f64,
     #[command(flatten)]
     contact: ContactArgs,
