@@ -287,7 +287,7 @@ fn a_saved_model_comes_back() {
     let text = toml::to_string(&saved).unwrap();
     let back: effects::corrected::SavedModel = toml::from_str(&text).unwrap();
     assert_eq!(saved, back);
-    let compiled = effects::corrected::Corrected::compile(&back).unwrap();
+    let compiled = effects::corrected::Corrected::compile_on(&back, None).unwrap();
     for (pass, f) in table.passes.iter().zip(result.predict(&table).unwrap()) {
         let got = compiled.lateral_force(pass);
         assert!((got - f.form).abs() < 1e-9 + 1e-6 * f.form.abs(), "{got} {}", f.form);

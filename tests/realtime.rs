@@ -280,7 +280,7 @@ fn corrected() -> effects::corrected::Corrected {
         unit: p.unit.into(),
         value: p.value(0.2),
     };
-    Corrected::compile(&SavedModel {
+    let model = SavedModel {
         schema: "muprime.model/1".into(),
         verdict: "named".into(),
         relative_sd: 0.01,
@@ -304,8 +304,8 @@ fn corrected() -> effects::corrected::Corrected {
             table: None,
             covariance: Vec::new(),
         }],
-    })
-    .unwrap()
+    };
+    Corrected::compile_on(&model, None).unwrap()
 }
 
 /// The law turned round, at scattered conditions: what it misses by, how often it asks the law, and that it

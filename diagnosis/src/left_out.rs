@@ -37,8 +37,6 @@ impl Errors {
 pub struct Region {
     /// What it is, in words.
     pub name: String,
-    /// Rows of the table.
-    pub rows: Vec<usize>,
     /// Errors there.
     pub errors: Errors,
     /// Whether the rest of the table holds enough of the gap, and of each cause's own part, to learn from.
@@ -238,7 +236,7 @@ pub fn left_out_regions(fitted: &Fitted, best: &Posterior) -> Vec<Region> {
             let informed = shown && gap > k.carrying_sd * scatter && gap > k.informed_share * whole;
             // A function that may be any says nothing of values that it was not seen at.
             let judges = !tells_nothing(problem, &rest, best) && !best.change.bends_over(over);
-            Region { name, rows, errors, informed, judges }
+            Region { name, errors, informed, judges }
         })
         .collect()
 }

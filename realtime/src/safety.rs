@@ -318,11 +318,6 @@ impl Safety {
         self.watch.exposure.in_all
     }
 
-    /// The present state.
-    pub const fn state(&self) -> State {
-        self.state
-    }
-
     /// Whether the second switch-off channel is being proved.
     pub const fn is_proving(&self) -> bool {
         matches!(self.state, State::Proving { .. })

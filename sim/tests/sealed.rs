@@ -12,7 +12,7 @@ fn a_set_is_its_seeds_and_reads_back_from_its_files() {
     let table = std::fs::File::open(folder.join("open/points.csv")).unwrap();
     assert_eq!(models::pass::read_passes(table).unwrap(), set.passes);
     let label = std::fs::read_to_string(folder.join("sealed/label.toml")).unwrap();
-    assert_eq!(Label::parse(&label).unwrap(), set.label);
+    assert_eq!(toml::from_str::<Label>(&label).unwrap(), set.label);
     let rig: toml::Table = std::fs::read_to_string(folder.join("open/rig.toml")).unwrap().parse().unwrap();
     assert!(rig["finger"]["normal_stiffness_n_per_m"].as_float().unwrap() > 1e5);
     std::fs::remove_dir_all(folder).unwrap();

@@ -161,18 +161,10 @@ pub struct Corrected {
 }
 
 impl Corrected {
-    /// Checks a saved model on the spring-slider and makes it ready.
+    /// Checks a saved model on the law that it corrects, none for the spring-slider, and makes it ready.
     ///
     /// # Errors
-    /// Names, ranges or a schema that the library does not know; a model that corrects another law.
-    pub fn compile(saved: &SavedModel) -> Result<Self, ModelError> {
-        Self::compile_on(saved, None)
-    }
-
-    /// The same on the law that the model corrects; none for the spring-slider.
-    ///
-    /// # Errors
-    /// As [`Corrected::compile`]; another law than the one that was corrected.
+    /// Names, ranges or a schema that the library does not know; another law than the one that was corrected.
     pub fn compile_on(saved: &SavedModel, law: Option<Arc<dyn FrictionModel>>) -> Result<Self, ModelError> {
         let none = || "none".to_string();
         let wanted = saved.law.as_ref().map(|l| (l.name.clone(), l.sha256.clone().unwrap_or_else(none)));

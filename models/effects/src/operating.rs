@@ -78,11 +78,6 @@ impl Baseline {
             ..Contact::default()
         }
     }
-
-    /// Signed mean lateral force of the baseline, N.
-    pub fn lateral_force(&self, pass: &Condition, design: &Design) -> f64 {
-        pass.direction.sign() * crate::contact::mean_friction(&self.contact(pass, design))
-    }
 }
 
 /// Share of a pass's load that is left at least where an effect takes load away: a contact without any has no closed form.

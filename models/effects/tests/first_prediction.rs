@@ -48,7 +48,7 @@ fn the_first_prediction_of_a_compiled_model_allocates_nothing() {
         law: None,
         effects: Vec::new(),
     };
-    let model = Corrected::compile(&saved).unwrap();
+    let model = Corrected::compile_on(&saved, None).unwrap();
     let before = ALLOCATED.load(Ordering::Relaxed);
     let force = model.lateral_force(&Condition::paper());
     let made = ALLOCATED.load(Ordering::Relaxed) - before;

@@ -192,7 +192,7 @@ fn every_law_can_be_made_ready_for_the_loop() {
                     covariance: Vec::new(),
                 }],
             };
-            let model = Corrected::compile(&saved).unwrap();
+            let model = Corrected::compile_on(&saved, None).unwrap();
             let active = [Active { effect, law, theta: &theta }];
             for (pass, force) in passes().iter().zip(forces(&BASELINE, &active)) {
                 let got = model.lateral_force(pass);

@@ -30,6 +30,11 @@ fn passes() -> Vec<Condition> {
     list
 }
 
+/// Signed mean lateral force without any effect, in closed form.
+fn alone(baseline: &Baseline, pass: &Condition) -> f64 {
+    pass.direction.sign() * muprime_effects::contact::mean_friction(&baseline.contact(pass, &DESIGN))
+}
+
 const DESIGN: Design = Design {
     duration_s: 200.0,
     reference_load_n: 0.35,
@@ -57,7 +62,7 @@ fn zero_is_the_baseline() {
                         &pass,
                         &DESIGN,
                     );
-                    let without = baseline.lateral_force(&pass, &DESIGN);
+                    let without = alone(&baseline, &pass);
                     assert!(
                         with.to_bits() == without.to_bits(),
                         "{} ({}): {with} is not {without} at {pass:?}",
@@ -89,7 +94,7 @@ fn small_sizes_are_continuous_and_all_predictions_finite() {
                     let with = muprime_effects::lateral_force(&baseline, &active, &pass, &DESIGN);
                     assert!(with.is_finite(), "{} ({}) at {size}: {pass:?}", effect.name, form.name);
                     if size == 1e-6 {
-                        let without = baseline.lateral_force(&pass, &DESIGN);
+                        let without = alone(&baseline, &pass);
                         assert!(
                             (with - without).abs() < 1.5e-2 * without.abs() + 1e-6,
                             "{} ({}): {with} {without} {pass:?}",
@@ -148,7 +153,7 @@ fn every_law_departs_from_the_baseline() {
             let theta: Vec<f64> = form.parameters.iter().enumerate().map(middle).collect();
             let active = [Active { effect, law, theta: &theta }];
             let change = |pass: &Condition| {
-                let without = baseline.lateral_force(pass, &DESIGN);
+                let without = alone(&baseline, pass);
                 (muprime_effects::lateral_force(&baseline, &active, pass, &DESIGN) / without - 1.0).abs()
             };
             let most = passes().iter().map(change).fold(0.0, f64::max);

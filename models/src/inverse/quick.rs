@@ -39,12 +39,6 @@ pub struct QuickAnswer {
 }
 
 impl QuickAnswer {
-    /// Standard uncertainty of the amplitude in m from that of `mu'`, to first order; `None` where the law
-    /// is flat.
-    pub fn amplitude_sd_m(&self, mu_relative_sd: f64) -> Option<f64> {
-        (self.slope_per_m < 0.0).then(|| mu_relative_sd / -self.slope_per_m)
-    }
-
     /// The slope in the logarithms, -1 where none is known, and the amplitude in m at which the line through
     /// this answer reaches `target`.
     fn onwards(&self, target: f64) -> (f64, f64) {

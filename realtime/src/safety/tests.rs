@@ -189,7 +189,7 @@ fn a_trip_latches_with_cause_value_bound_and_cycle() {
     };
     let (cause, cycles) = bench.until_off(over);
     assert_eq!((cause, cycles), (Cause::NormalOverforce, 2), "a step is confirmed by its second sample");
-    let State::Faulted(trip) = bench.safety.state() else { panic!("not faulted") };
+    let State::Faulted(trip) = bench.safety.state else { panic!("not faulted") };
     assert_eq!((trip.value, trip.bound, trip.cycle), (1.6, 1.5, u64::from(before) + 2));
     for _ in 0..100 {
         assert!(

@@ -150,23 +150,6 @@ impl Defects {
         let channels = file.channel.into_iter().map(toml::Spanned::into_inner).collect();
         Ok(Self { defects, channels })
     }
-
-    /// The file that reads back as these defects.
-    pub fn to_toml(&self) -> String {
-        let mut out = String::new();
-        for defect in &self.defects {
-            out.push_str(&format!("[[defect]]\nname = \"{}\"\n[defect.parameters]\n", defect.kind.name));
-            for (parameter, value) in defect.kind.parameters.iter().zip(defect.values) {
-                out.push_str(&format!("{} = {value:e}\n", parameter.name));
-            }
-            out.push('\n');
-        }
-        for channel in &self.channels {
-            let text = toml::to_string(channel).unwrap_or_default();
-            out.push_str(&format!("[[channel]]\n{text}\n"));
-        }
-        out
-    }
 }
 
 fn drawn(kind: &DefectKind, seed: u64) -> Values {
@@ -182,12 +165,29 @@ fn unknown(line: usize, name: &str) -> DefectsError {
 mod tests {
     use super::*;
 
+    /// The file that reads back as these defects.
+    fn to_toml(of: &Defects) -> String {
+        let mut out = String::new();
+        for defect in &of.defects {
+            out.push_str(&format!("[[defect]]\nname = \"{}\"\n[defect.parameters]\n", defect.kind.name));
+            for (parameter, value) in defect.kind.parameters.iter().zip(defect.values) {
+                out.push_str(&format!("{} = {value:e}\n", parameter.name));
+            }
+            out.push('\n');
+        }
+        for channel in &of.channels {
+            let text = toml::to_string(channel).unwrap_or_default();
+            out.push_str(&format!("[[channel]]\n{text}\n"));
+        }
+        out
+    }
+
     #[test]
     fn a_file_reads_back_as_itself() {
         let text = "[[defect]]\nname = \"squeeze_film\"\nseed = 7\n\n[[channel]]\nchannel = \"force\"\nfault = \"stuck\"\nfrom_s = 2.5\nuntil_s = 3.0\n";
         let defects = Defects::parse(text).unwrap();
         assert_eq!(defects.defects[0], Defects::sealed("squeeze_film", 7).unwrap().defects[0]);
-        assert_eq!(Defects::parse(&defects.to_toml()).unwrap(), defects);
+        assert_eq!(Defects::parse(&to_toml(&defects)).unwrap(), defects);
     }
 
     #[test]

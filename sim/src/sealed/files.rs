@@ -1,6 +1,6 @@
 //! A sealed set on disk: what a diagnoser may read in one folder, what only the scorer may read in another.
 
-use super::{Label, Set};
+use super::Set;
 use std::fs;
 use std::io;
 use std::path::Path;
@@ -30,15 +30,5 @@ impl Set {
             truth.push_str(&format!("{},{with:?},{without:?},{recalibrated:?},{sd:?}\n", i + 1));
         }
         fs::write(sealed.join("truth.csv"), truth)
-    }
-}
-
-impl Label {
-    /// Reads a label back.
-    ///
-    /// # Errors
-    /// Text that is not a label.
-    pub fn parse(text: &str) -> Result<Self, toml::de::Error> {
-        toml::from_str(text)
     }
 }

@@ -148,7 +148,7 @@ fn figure(file: &CampaignFile, made: &[Measured], factor: &'static Covariate) ->
     let [low, high] = ends(&values);
     let ridge = Surrogate::shipped().ok();
     let series = |cell: usize| {
-        let mut series = Series { name: file.cell[cell].name.clone(), ..Series::default() };
+        let mut series = Series::default();
         // Levels are those of the whole campaign; each session's mean counts once.
         for (value, level) in values.iter().zip(levels.values()) {
             let own: Vec<f64> = of_cell(made, cell).filter_map(|s| mean_near(s, level)).collect();
@@ -199,7 +199,6 @@ fn mean_near(session: &Measured, level: &[Driven]) -> Option<f64> {
 /// Mean relative friction of each session against its `mu_0`.
 fn across_mu0(file: &CampaignFile, made: &[Measured]) -> miette::Result<String> {
     let series = |cell: usize| Series {
-        name: file.cell[cell].name.clone(),
         points: of_cell(made, cell).filter_map(|s| Some((s.mu0?, s.mean_mu()?, 0.0))).collect(),
         ..Series::default()
     };

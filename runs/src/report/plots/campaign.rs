@@ -8,8 +8,6 @@ use models::reading::Reading;
 /// What one cell, or one model of it, puts into a figure.
 #[derive(Default)]
 pub struct Series {
-    /// Name of the cell.
-    pub name: String,
     /// Measured: place, mu' and its standard deviation over sessions.
     pub points: Vec<(f64, f64, f64)>,
     /// The spring-slider: place, mu' and its standard uncertainty.
