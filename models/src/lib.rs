@@ -57,7 +57,6 @@ pub mod ridge;
 pub mod rig_file;
 pub mod root;
 pub mod sparse;
-pub mod spelling;
 pub mod spring_slider;
 pub mod surrogate;
 pub mod target;

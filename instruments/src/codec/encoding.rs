@@ -1,9 +1,8 @@
 //! Texts of other programs: UTF-8 and UTF-16 by their mark, UTF-8 where it is that, else Windows-1252, which
 //! editors of DBC files and data sheets write.
 
-/// What Windows-1252 has between 0x80 and 0x9F; the rest of it is Latin-1.
-const WINDOWS: &str = "\u{20ac}\u{81}\u{201a}\u{192}\u{201e}\u{2026}\u{2020}\u{2021}\u{2c6}\u{2030}\u{160}\u{2039}\u{152}\u{8d}\u{17d}\u{8f}\
-    \u{90}\u{2018}\u{2019}\u{201c}\u{201d}\u{2022}\u{2013}\u{2014}\u{2dc}\u{2122}\u{161}\u{203a}\u{153}\u{9d}\u{17e}\u{178}";
+use encoding_rs::{Encoding, UTF_8, WINDOWS_1252};
+use std::borrow::Cow;
 
 /// Bytes that are no text.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, thiserror::Error)]
@@ -21,29 +20,16 @@ pub enum NotText {
 /// # Errors
 /// UTF-16 that is cut or damaged; bytes of zero, which no text has.
 pub fn decoded(bytes: &[u8]) -> Result<String, NotText> {
-    let wide = |rest: &[u8], read: fn([u8; 2]) -> u16| {
-        let units: Vec<u16> = rest.chunks_exact(2).map(|pair| read([pair[0], pair[1]])).collect();
-        String::from_utf16(&units).ok().filter(|_| rest.len().is_multiple_of(2)).ok_or(NotText::Utf16)
-    };
-    let bytes = match bytes {
-        [0xff, 0xfe, rest @ ..] => return wide(rest, u16::from_le_bytes),
-        [0xfe, 0xff, rest @ ..] => return wide(rest, u16::from_be_bytes),
-        [0xef, 0xbb, 0xbf, rest @ ..] => rest,
-        bytes => bytes,
-    };
+    let (encoding, mark) = Encoding::for_bom(bytes).unwrap_or((UTF_8, 0));
+    let bytes = &bytes[mark..];
+    let strict = encoding.decode_without_bom_handling_and_without_replacement(bytes);
+    if encoding != UTF_8 {
+        return strict.map(Cow::into_owned).ok_or(NotText::Utf16);
+    }
     if let Some(at) = bytes.iter().position(|byte| *byte == 0) {
         return Err(NotText::Zero(at));
     }
-    Ok(std::str::from_utf8(bytes).map_or_else(
-        |_| {
-            let letter = |byte: &u8| match byte {
-                0x80..=0x9f => WINDOWS.chars().nth(usize::from(byte - 0x80)).unwrap_or('\u{fffd}'),
-                byte => char::from(*byte),
-            };
-            bytes.iter().map(letter).collect()
-        },
-        String::from,
-    ))
+    Ok(strict.unwrap_or_else(|| WINDOWS_1252.decode_without_bom_handling(bytes).0).into_owned())
 }
 
 #[cfg(test)]

@@ -4,48 +4,28 @@
 //! Format: MCAP specification 0, "Summary section" (<https://mcap.dev/spec>).
 
 use super::{TOPICS, schema};
-use mcap::records::{ChunkIndex, Record, Statistics, op};
+use binrw::{BinRead, BinWrite};
+use mcap::records::{
+    AttachmentIndex, Channel, ChunkHeader, ChunkIndex, DataEnd, Footer, MetadataIndex, Record, SchemaHeader,
+    Statistics, SummaryOffset, op,
+};
 use mcap::{MAGIC, McapError};
 use std::collections::BTreeMap;
-use std::io::{BufReader, Read, Seek, SeekFrom, Write};
+use std::io::{BufReader, Cursor, Read, Seek, SeekFrom, Write};
 
 /// Bytes of index entries that are held before they are written.
 const HELD: usize = 256 * 1024;
 /// Length of an opcode and the length that follows it.
 const HEAD: u64 = 9;
 
-/// Bytes in the order of the format: little-endian, lengths before contents.
-#[derive(Default)]
-struct Bytes(Vec<u8>);
-
-impl Bytes {
-    fn u16(mut self, value: u16) -> Self {
-        self.0.extend(value.to_le_bytes());
-        self
-    }
-    fn u32(mut self, value: u32) -> Self {
-        self.0.extend(value.to_le_bytes());
-        self
-    }
-    fn u64(mut self, value: u64) -> Self {
-        self.0.extend(value.to_le_bytes());
-        self
-    }
-    fn text(mut self, value: &[u8]) -> Self {
-        self = self.u32(value.len() as u32);
-        self.0.extend(value);
-        self
-    }
-    fn map(mut self, of: &BTreeMap<u16, u64>) -> Self {
-        self = self.u32(10 * of.len() as u32);
-        of.iter().fold(self, |bytes, (key, value)| bytes.u16(*key).u64(*value))
-    }
-    /// Appends these bytes to `to` as a record.
-    fn record(self, opcode: u8, to: &mut Vec<u8>) {
-        to.push(opcode);
-        to.extend((self.0.len() as u64).to_le_bytes());
-        to.extend(self.0);
-    }
+/// Appends a record to `to`.
+fn put(opcode: u8, record: impl for<'a> BinWrite<Args<'a> = ()>, more: &[u8], to: &mut Vec<u8>) {
+    let mut body = Cursor::new(Vec::new());
+    record.write_le(&mut body).expect("memory takes every record");
+    let body = body.into_inner();
+    to.push(opcode);
+    to.extend(((body.len() + more.len()) as u64).to_le_bytes());
+    to.extend([&body, more].concat());
 }
 
 /// The file from its beginning up to its data's end, record by record.
@@ -94,30 +74,22 @@ impl Walk {
     }
 
     /// Reads a chunk's head; returns how many bytes that took.
-    fn chunk(&mut self, file: &mut impl Read, length: u64) -> Result<u64, McapError> {
-        // First and last log time, uncompressed size, its checksum, length of the compression's name.
-        let mut head = [0; 32];
-        file.read_exact(&mut head)?;
-        let number = |at: usize| u64::from_le_bytes(head[at..at + 8].try_into().expect("eight bytes"));
-        let name = u32::from_le_bytes(head[28..].try_into().expect("four bytes"));
-        let mut compression = vec![0; name as usize];
-        file.read_exact(&mut compression)?;
-        let compression = String::from_utf8_lossy(&compression).into_owned();
-        let mut compressed = [0; 8];
-        file.read_exact(&mut compressed)?;
+    fn chunk(&mut self, file: &mut (impl Read + Seek), length: u64) -> Result<u64, McapError> {
+        let head = ChunkHeader::read_le(file)?;
+        let taken = 40 + head.compression.len() as u64;
         self.chunk = Some(ChunkIndex {
-            message_start_time: number(0),
-            message_end_time: number(8),
+            message_start_time: head.message_start_time,
+            message_end_time: head.message_end_time,
             chunk_start_offset: self.at,
             chunk_length: length,
             message_index_offsets: BTreeMap::new(),
             message_index_length: 0,
-            compression,
-            compressed_size: u64::from_le_bytes(compressed),
-            uncompressed_size: number(16),
+            compression: head.compression,
+            compressed_size: head.compressed_size,
+            uncompressed_size: head.uncompressed_size,
         });
         self.counts.chunk_count += 1;
-        Ok(40 + u64::from(name))
+        Ok(taken)
     }
 
     /// Reads of which channel an index of messages is, and how many it lists; returns how many bytes that took.
@@ -144,39 +116,34 @@ impl Walk {
     }
 
     fn other(&mut self, record: Record<'_>, length: u64) {
-        let place = Bytes::default().u64(self.at).u64(length);
+        let offset = self.at;
         match record {
             Record::Attachment { header, data, .. } => {
                 self.counts.attachment_count += 1;
-                place
-                    .u64(header.log_time)
-                    .u64(header.create_time)
-                    .u64(data.len() as u64)
-                    .text(header.name.as_bytes())
-                    .text(header.media_type.as_bytes())
-                    .record(op::ATTACHMENT_INDEX, &mut self.others[0]);
+                let index = AttachmentIndex {
+                    offset,
+                    length,
+                    log_time: header.log_time,
+                    create_time: header.create_time,
+                    data_size: data.len() as u64,
+                    name: header.name,
+                    media_type: header.media_type,
+                };
+                put(op::ATTACHMENT_INDEX, index, &[], &mut self.others[0]);
             }
             Record::Metadata(metadata) => {
                 self.counts.metadata_count += 1;
-                place.text(metadata.name.as_bytes()).record(op::METADATA_INDEX, &mut self.others[1]);
+                let index = MetadataIndex { offset, length, name: metadata.name };
+                put(op::METADATA_INDEX, index, &[], &mut self.others[1]);
             }
             _ => {}
         }
     }
 
     fn close(&mut self, held: &mut Vec<u8>) {
-        let Some(chunk) = self.chunk.take() else { return };
-        Bytes::default()
-            .u64(chunk.message_start_time)
-            .u64(chunk.message_end_time)
-            .u64(chunk.chunk_start_offset)
-            .u64(chunk.chunk_length)
-            .map(&chunk.message_index_offsets)
-            .u64(chunk.message_index_length)
-            .text(chunk.compression.as_bytes())
-            .u64(chunk.compressed_size)
-            .u64(chunk.uncompressed_size)
-            .record(op::CHUNK_INDEX, held);
+        if let Some(chunk) = self.chunk.take() {
+            put(op::CHUNK_INDEX, chunk, &[], held);
+        }
     }
 }
 
@@ -199,10 +166,10 @@ impl<F: Read + Write + Seek> Summary<'_, F> {
     }
 
     /// Notes that everything since `from` is of one kind.
-    fn group(&mut self, opcode: u8, from: u64) {
-        if self.at > from {
-            let group = Bytes(vec![opcode]).u64(from).u64(self.at - from);
-            group.record(op::SUMMARY_OFFSET, &mut self.offsets);
+    fn group(&mut self, group_opcode: u8, group_start: u64) {
+        if self.at > group_start {
+            let group = SummaryOffset { group_opcode, group_start, group_length: self.at - group_start };
+            put(op::SUMMARY_OFFSET, group, &[], &mut self.offsets);
         }
     }
 
@@ -218,7 +185,7 @@ impl<F: Read + Write + Seek> Summary<'_, F> {
 pub(super) fn end(file: &mut (impl Read + Write + Seek), data_crc: u32) -> Result<(), McapError> {
     let end = file.seek(SeekFrom::End(0))?;
     let mut mark = Vec::new();
-    Bytes::default().u32(data_crc).record(op::DATA_END, &mut mark);
+    put(op::DATA_END, DataEnd { data_section_crc: data_crc }, &[], &mut mark);
     file.write_all(&mark)?;
     let start = end + mark.len() as u64;
     let checksum = crc32fast::Hasher::new();
@@ -226,14 +193,13 @@ pub(super) fn end(file: &mut (impl Read + Write + Seek), data_crc: u32) -> Resul
     let (mut schemas, mut channels) = (Vec::new(), Vec::new());
     for (kind, topic) in TOPICS.into_iter().enumerate() {
         let id = kind as u16 + 1;
-        Bytes::default()
-            .u16(id)
-            .text(schema::name_of(topic).as_bytes())
-            .text(schema::ENCODING.as_bytes())
-            .text(schema::of(kind))
-            .record(op::SCHEMA, &mut schemas);
-        let channel = Bytes::default().u16(id).u16(id).text(topic.as_bytes()).text(b"json");
-        channel.u32(0).record(op::CHANNEL, &mut channels);
+        let (name, encoding) = (schema::name_of(topic).to_string(), schema::ENCODING.to_string());
+        let data = schema::of(kind);
+        let sized = [&(data.len() as u32).to_le_bytes(), data].concat();
+        put(op::SCHEMA, SchemaHeader { id, name, encoding }, &sized, &mut schemas);
+        let (message_encoding, metadata) = ("json".to_string(), BTreeMap::new());
+        let channel = Channel { id, schema_id: id, topic: topic.to_string(), message_encoding, metadata };
+        put(op::CHANNEL, channel, &[], &mut channels);
     }
     summary.write_group(op::SCHEMA, &schemas)?;
     summary.write_group(op::CHANNEL, &channels)?;
@@ -255,17 +221,9 @@ pub(super) fn end(file: &mut (impl Read + Write + Seek), data_crc: u32) -> Resul
     summary.write_group(op::ATTACHMENT_INDEX, &attachments)?;
     summary.write_group(op::METADATA_INDEX, &metadata)?;
     let mut statistics = Vec::new();
-    Bytes::default()
-        .u64(counts.message_count)
-        .u16(TOPICS.len() as u16)
-        .u32(TOPICS.len() as u32)
-        .u32(counts.attachment_count)
-        .u32(counts.metadata_count)
-        .u32(counts.chunk_count)
-        .u64(counts.message_start_time)
-        .u64(counts.message_end_time)
-        .map(&counts.channel_message_counts)
-        .record(op::STATISTICS, &mut statistics);
+    let topics = TOPICS.len();
+    let counts = Statistics { schema_count: topics as u16, channel_count: topics as u32, ..counts };
+    put(op::STATISTICS, counts, &[], &mut statistics);
     summary.write_group(op::STATISTICS, &statistics)?;
     footer(summary)
 }
@@ -276,7 +234,8 @@ fn footer<F: Read + Write + Seek>(mut summary: Summary<'_, F>) -> Result<(), Mca
     summary.write(&offsets)?;
     // The checksum covers the footer up to itself.
     let mut footer = Vec::new();
-    Bytes::default().u64(summary.start).u64(offsets_start).u32(0).record(op::FOOTER, &mut footer);
+    let (summary_start, summary_offset_start) = (summary.start, offsets_start);
+    put(op::FOOTER, Footer { summary_start, summary_offset_start, summary_crc: 0 }, &[], &mut footer);
     footer.truncate(footer.len() - 4);
     summary.write(&footer)?;
     let checksum = summary.checksum.clone().finalize();

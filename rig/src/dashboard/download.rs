@@ -1,21 +1,15 @@
 //! Files of a run's folder, as they are: read piece by piece, so that a record of hours needs no memory.
 
-use axum::body::{Body, Bytes};
+use axum::body::Body;
 use axum::http::header;
 use axum::response::{IntoResponse, Response};
-use hyper::body::Frame;
 use runs::verdict_text::files;
-use std::fs::{File, OpenOptions};
-use std::io::Read;
+use std::fs::OpenOptions;
 use std::path::Path;
-use std::pin::Pin;
-use std::task::{Context, Poll};
-use tokio::sync::mpsc::{Receiver, channel};
+use tokio_util::io::ReaderStream;
 
 /// Bytes of a piece.
 const PIECE: usize = 64 * 1024;
-/// Pieces that wait for a slow browser.
-const WAITING: usize = 4;
 /// What may be downloaded besides the records.
 const NAMES: [&str; 11] = [
     "points.csv",
@@ -43,38 +37,8 @@ pub fn file(run: &Path, name: &str) -> Option<Response> {
     if !files_in(run).iter().any(|one| one == name) {
         return None;
     }
-    let mut file = runs::files::open_plain(&run.join(name), OpenOptions::new().read(true)).ok()?;
-    let (to, pieces) = channel(WAITING);
-    let send = move || {
-        while let Some(piece) = next(&mut file).transpose() {
-            if to.blocking_send(piece).is_err() {
-                return;
-            }
-        }
-    };
-    std::thread::Builder::new().name("download".into()).spawn(send).ok()?;
-    Some(([(header::CONTENT_TYPE, "application/octet-stream")], Body::new(Pieces(pieces))).into_response())
-}
-
-fn next(file: &mut File) -> std::io::Result<Option<Bytes>> {
-    let mut piece = vec![0; PIECE];
-    let n = file.read(&mut piece)?;
-    piece.truncate(n);
-    Ok((n > 0).then(|| piece.into()))
-}
-
-/// The body of an answer. A file that cannot be read further ends it early, so that nobody takes it for
-/// whole.
-struct Pieces(Receiver<std::io::Result<Bytes>>);
-
-impl hyper::body::Body for Pieces {
-    type Data = Bytes;
-    type Error = std::io::Error;
-
-    fn poll_frame(
-        mut self: Pin<&mut Self>,
-        context: &mut Context<'_>,
-    ) -> Poll<Option<std::io::Result<Frame<Bytes>>>> {
-        self.0.poll_recv(context).map(|piece| piece.map(|piece| piece.map(Frame::data)))
-    }
+    // A file that cannot be read further ends the answer early, so that nobody takes it for whole.
+    let file = runs::files::open_plain(&run.join(name), OpenOptions::new().read(true)).ok()?;
+    let pieces = ReaderStream::with_capacity(tokio::fs::File::from_std(file), PIECE);
+    Some(([(header::CONTENT_TYPE, "application/octet-stream")], Body::from_stream(pieces)).into_response())
 }

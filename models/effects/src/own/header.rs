@@ -1,6 +1,6 @@
 //! What the comments above a table of an effect state.
 
-use models::spelling::distance;
+use strsim::levenshtein;
 
 /// What they may state.
 const KEYS: [&str; 3] = ["place", "summary", "size_sd"];
@@ -36,7 +36,7 @@ fn meant(word: &str, key: &str) -> bool {
     let letters = |text: &str| text.to_lowercase().replace(|c: char| !c.is_alphanumeric(), "");
     let (word, key) = (letters(word), letters(key));
     let moved = word.len() == key.len() && word.chars().all(|c| key.contains(c));
-    (moved || distance(&word, &key) <= key.len() / 3) && !WORDS.contains(&&*word)
+    (moved || levenshtein(&word, &key) <= key.len() / 3) && !WORDS.contains(&&*word)
 }
 
 #[cfg(test)]

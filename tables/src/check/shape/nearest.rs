@@ -1,7 +1,7 @@
 //! The known name that a misspelt one is nearest to.
 
-pub use models::spelling::distance;
 use runs::input::unit_of;
+use strsim::levenshtein;
 
 /// What to say of the known name that a misspelt one is nearest to.
 pub fn nearest(name: &str, known: &[&str]) -> Option<String> {
@@ -20,7 +20,7 @@ pub fn in_its_unit(name: &str, meant: &str) -> bool {
 /// The known name that a misspelt one is nearest to.
 pub fn nearest_of<'k>(name: &str, known: &[&'k str]) -> Option<&'k str> {
     // A name without its unit is meant as often as a misspelt one.
-    let of = |k: &str| if k.starts_with(&format!("{name}_")) { 1 } else { distance(name, k) };
+    let of = |k: &str| if k.starts_with(&format!("{name}_")) { 1 } else { levenshtein(name, k) };
     let (distance, best) = known.iter().map(|k| (of(k), *k)).min()?;
     (distance <= 2.max(name.len() / 3)).then_some(best)
 }

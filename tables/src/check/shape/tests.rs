@@ -1,6 +1,6 @@
 //! Files of another shape than that of their kind.
 
-use super::nearest::{distance, nearest};
+use super::nearest::nearest;
 use super::*;
 use crate::schemas::schema::Kind;
 
@@ -71,5 +71,4 @@ fn misspelt_names_find_theirs() {
         "did you mean `amplitude_pp_m`?"
     );
     assert_eq!(nearest("colour", &["amplitude_pp_m"]), None);
-    assert_eq!(distance("kitten", "sitting"), 3);
 }
