@@ -83,7 +83,7 @@ fn a_withheld_cause_is_no_other_cause() {
             let without = vec![name.to_string()];
             let scored = score(&set, &Options { without, ..Options::default() }).unwrap();
             println!("{name}: {:?} {:?} {:.2}", scored.verdict, scored.named, scored.top_probability);
-            let alias = |n: &String| effects::near(n, name);
+            let alias = |n: &String| tests::near::near(n, name);
             let confident = scored.verdict == Verdict::Named && !scored.named.iter().all(alias);
             confident.then(|| format!("{name} as {:?}", scored.named))
         })

@@ -59,7 +59,7 @@ fn expected(setup: &Setup, model: &str) -> Vec<f64> {
     let model = runs::model_file::load_for(setup, "model.toml", model).unwrap();
     let plan = Plan::load("first-sweep").unwrap();
     let made =
-        runs::job::sweep_in_memory(setup, &plan, 3, &WorldConfig::ideal(), model, &mut |_| {}).unwrap();
+        tests::memory::sweep_in_memory(setup, &plan, 3, &WorldConfig::ideal(), model, &mut |_| {}).unwrap();
     let vibrating = made.passes.iter().filter(|p| p.pass.amplitude > PeakToPeak::ZERO);
     vibrating.filter_map(|p| p.comparison.map(|c| c.predicted)).collect()
 }
@@ -121,7 +121,8 @@ fn what_a_setup_states_reaches_the_files_of_the_run() {
     assert!(model.is_err(), "the law needs a temperature, whatever its size");
     let plan = Plan::load("first-sweep").unwrap();
     let law = std::sync::Arc::new(models::prediction::SpringSlider::new(setup.tip.finger).unwrap());
-    let made = runs::job::sweep_in_memory(&setup, &plan, 3, &WorldConfig::ideal(), law, &mut |_| {}).unwrap();
+    let made =
+        tests::memory::sweep_in_memory(&setup, &plan, 3, &WorldConfig::ideal(), law, &mut |_| {}).unwrap();
     assert!(!made.passes.is_empty());
     for p in &made.passes {
         assert_eq!(p.pass.ambient_pressure_pa, Some(95_000.0));

@@ -5,13 +5,13 @@ use diagnosis::timing::{Comparison, judge, mean_delay_s};
 use models::prediction::SpringSlider;
 use rayon::prelude::*;
 use runs::edges::Collector;
-use runs::job::sweep_in_memory;
 use runs::plan::Plan;
 use runs::sequence::Outcome;
 use runs::setup::Setup;
 use sim::defects::Defects;
 use sim::world::WorldConfig;
 use std::sync::Arc;
+use tests::memory::sweep_in_memory;
 use tests::rounds;
 
 /// Fixed before any run with them; the method was made on 41000 to 41700.

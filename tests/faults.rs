@@ -3,6 +3,7 @@
 use studies::cases::kinds::faults::{Settings, search};
 use studies::validation::faults::rows::What;
 use studies::validation::faults::scene::STEADY_AT;
+use studies::validation::faults::search::judged;
 use studies::validation::faults::{Core, Expect, Moment, Pace, ROWS, Scene, Strike, Tally, run, run_with};
 use tests::rounds;
 
@@ -23,7 +24,8 @@ fn every_fault_in_every_phase_is_answered_within_its_bound_and_for_its_cause() {
                 // Seed 1 is struck by the tests of the page (`tests/requirements.rs`).
                 for seed in [0, 2] {
                     let strikes = vec![Strike { row, at: STEADY_AT + 37 * seed }];
-                    tally.take(&Scene { moment: *moment, seed, strikes, pace }, seed == 0);
+                    let scene = Scene { moment: *moment, seed, strikes, pace };
+                    tally.count(&scene, judged(&scene, seed == 0), seed == 0);
                 }
             }
         }
@@ -42,7 +44,8 @@ fn every_fault_is_answered_within_its_bound_while_a_target_is_rendered() {
         {
             for seed in 0..rounds(2, 100) {
                 let strikes = vec![Strike { row, at: STEADY_AT + 37 * seed % 401 }];
-                tally.take(&Scene { moment: Moment::Render, seed, strikes, pace }, seed == 0);
+                let scene = Scene { moment: Moment::Render, seed, strikes, pace };
+                tally.count(&scene, judged(&scene, seed == 0), seed == 0);
             }
             assert!(!fault.name.is_empty());
         }

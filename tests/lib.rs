@@ -1,7 +1,9 @@
-//! Helpers that several system tests share: `contents`, `peer`, `served`, `study`, `waiting`. README.md lists
+//! Helpers that several system tests share: `contents`, `memory`, `near`, `peer`, `served`, `study`, `waiting`. README.md lists
 //! the tests.
 
 pub mod contents;
+pub mod memory;
+pub mod near;
 pub mod peer;
 pub mod served;
 pub mod study;

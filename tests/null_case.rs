@@ -4,13 +4,13 @@
 use models::prediction::{FrictionModel, SpringSlider};
 use rayon::prelude::*;
 use realtime::compare::{Agreement, Lack};
-use runs::job::{MemorySweep, sweep_in_memory};
 use runs::plan::Plan;
 use runs::sequence::Outcome;
 use runs::setup::Setup;
 use sim::defects::Defects;
 use sim::world::WorldConfig;
 use std::sync::Arc;
+use tests::memory::{MemorySweep, sweep_in_memory};
 use tests::rounds;
 
 /// Seeds are fixed here, before any run.

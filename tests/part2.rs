@@ -61,7 +61,7 @@ fn judged(verdict: &serde_json::Value, truth: &str) -> String {
     match verdict["verdict"].as_str().unwrap() {
         "named" if first == [truth] => "named".into(),
         "named" if first.iter().any(|n| n == truth) => "named in a pair".into(),
-        "named" if first.iter().all(|n| effects::near(n, truth)) => "in class".into(),
+        "named" if first.iter().all(|n| tests::near::near(n, truth)) => "in class".into(),
         "named" => format!("WRONG: {}", first.join(" and ")),
         other => other.replace('_', " "),
     }

@@ -16,12 +16,12 @@ use models::surrogate::Surrogate;
 use rand_chacha::ChaCha8Rng;
 use rand_chacha::rand_core::{Rng, SeedableRng};
 use rayon::prelude::*;
-use runs::job::sweep_in_memory;
 use runs::plan::{Plan, Resolution};
 use runs::sequence::Outcome;
 use runs::setup::Setup;
 use sim::world::WorldConfig;
 use std::sync::Arc;
+use tests::memory::sweep_in_memory;
 use tests::{documents, muprime, rounds};
 
 #[path = "reading/psi_star.rs"]

@@ -260,7 +260,8 @@ fn everything_bundled_passes_its_own_check() {
 #[test]
 fn deadlines_that_were_missed_are_counted_with_their_lateness() {
     use realtime::ports::Nanos;
-    use runs::job::{LATENESS_BOUNDS_S, Snapshots, sweep_in_memory};
+    use runs::job::{LATENESS_BOUNDS_S, Snapshots};
+    use tests::memory::sweep_in_memory;
     let setup = runs::setup::Setup::load("virtual-ideal").unwrap();
     let folder = tempfile::tempdir().unwrap();
     let plan = runs::plan::Plan::load(&short_plan(folder.path())).unwrap();

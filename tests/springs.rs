@@ -5,13 +5,13 @@ use models::pass::Pass;
 use models::prediction::SpringSlider;
 use models::quantity::PeakToPeak;
 use rayon::prelude::*;
-use runs::job::sweep_in_memory;
 use runs::plan::Plan;
 use runs::sequence::Outcome;
 use runs::setup::Setup;
 use sim::finger::Finger;
 use sim::world::WorldConfig;
 use std::sync::Arc;
+use tests::memory::sweep_in_memory;
 use tests::{documents, muprime, rounds, texts};
 
 /// Fixed before the first of them was run.

@@ -132,11 +132,12 @@ mod tests {
         assert!(!amplifier(2, Some("b")).is_disjoint(&amplifier(2, Some("a"))));
         let rig = |unit: u8| {
             let at = |profile| InstrumentSetup::new(profile, "10.0.0.7");
-            let mut setup = InstrumentsSetup::new(
-                vec![at("muprime-force2")],
-                at("muprime-amplifier"),
-                at("muprime-stage"),
-            );
+            let mut setup = InstrumentsSetup {
+                force: vec![at("muprime-force2")],
+                amplifier: at("muprime-amplifier"),
+                stage: at("muprime-stage"),
+                ..Default::default()
+            };
             setup.amplifier.unit = Some(unit);
             identities(&setup).unwrap()
         };

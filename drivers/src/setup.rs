@@ -43,7 +43,7 @@ pub enum SetupError {
 }
 
 /// Which instruments make up the rig.
-#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+#[derive(Debug, Clone, Default, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct InstrumentsSetup {
     /// One instrument with both axes, or two with one each.
@@ -64,15 +64,6 @@ pub struct InstrumentsSetup {
 }
 
 impl InstrumentsSetup {
-    /// A rig without a second switch-off channel and without safety contacts.
-    pub const fn new(
-        force: Vec<InstrumentSetup>,
-        amplifier: InstrumentSetup,
-        stage: InstrumentSetup,
-    ) -> Self {
-        Self { force, amplifier, stage, supply_relay: None, safety_inputs: None, chamber: None }
-    }
-
     /// Every instrument.
     pub fn all(&self) -> impl Iterator<Item = &InstrumentSetup> {
         self.force

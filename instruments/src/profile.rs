@@ -309,14 +309,31 @@ impl Profile {
     /// of text and of a signal that is worked out a count is 1e-12 of its unit: no certificate depends on the
     /// resolution that a profile states. Zero where the frame is too short.
     pub fn raw(&self, signal: SignalId, frame: &[u8], values: &Values) -> i64 {
-        let place = &self.signals[signal.0].place;
-        let read = || place.read(frame).unwrap_or(0.0);
-        let (number, count) = match place {
-            Place::Computed(_) => (values.get(signal), COUNT_OF_A_FLOAT),
-            place if !place.has_counts() => (read(), COUNT_OF_A_FLOAT),
+        match &self.signals[signal.0].place {
+            Place::Computed(_) => self.in_counts(signal, values.get(signal)),
+            place => self.in_counts(signal, place.read(frame).unwrap_or(0.0)),
+        }
+    }
+
+    /// The counts of [`Profile::raw`] that stand for a value in SI units, at the scale that holds now.
+    pub fn counts(&self, signal: SignalId, value_si: f64, values: &Values) -> i64 {
+        let described = &self.signals[signal.0];
+        let value = value_si / described.si_factor;
+        if let Place::Computed(_) = described.place {
+            return self.in_counts(signal, value);
+        }
+        let expression =
+            described.scale_expression.as_ref().map_or(1.0, |scale| scale.value(values.as_slice()));
+        self.in_counts(signal, (value - described.offset) / (described.scale * expression))
+    }
+
+    fn in_counts(&self, signal: SignalId, number: f64) -> i64 {
+        let count = match &self.signals[signal.0].place {
+            Place::Computed(_) => COUNT_OF_A_FLOAT,
+            place if !place.has_counts() => COUNT_OF_A_FLOAT,
             // The file's offset shifts the counts.
-            Place::Dbc(_, dbc) => (read(), dbc.factor),
-            Place::Bytes(_) => (read(), 1.0),
+            Place::Dbc(_, dbc) => dbc.factor,
+            Place::Bytes(_) => 1.0,
         };
         // saturates, and NaN gives zero
         (number / count).round() as i64

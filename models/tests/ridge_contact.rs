@@ -1,5 +1,9 @@
 //! Contact and friction against closed forms and published benchmarks.
 
+#[path = "ridge/block.rs"]
+mod block;
+
+use block::block;
 use muprime_models::ridge::{
     Body, FrictionRule, Material, Mesh, Plate, RidgeGeometry, RidgeProfile, Strain, Surface, stability,
 };
@@ -16,7 +20,7 @@ fn springs(mesh: &Mesh, per_metre: f64) -> Vec<f64> {
 fn bouncing_bar() {
     let material = Material::elastic(900.0, 0.0, 1.0);
     let (length, rows) = (10.0, 400);
-    let mesh = Mesh::block(1.0, length, 8, rows, material, true).expect("valid");
+    let mesh = block([1.0, length], [8, rows], material, true).expect("valid");
     let penalty = springs(&mesh, 1e5);
     let mut body = Body::new(mesh, Strain::Small);
     body.scale_bulk_viscosity(0.0);
@@ -65,7 +69,7 @@ fn bouncing_bar() {
 #[test]
 fn contact_patch_is_uniform() {
     let material = Material::elastic(1e6, 0.3, 1000.0);
-    let mesh = Mesh::block(1.0, 1.0, 8, 8, material, false).expect("valid");
+    let mesh = block([1.0, 1.0], [8, 8], material, false).expect("valid");
     let width = mesh.tributary_width_m(0);
     let penalty = springs(&mesh, 1e8);
     let mut body = Body::new(mesh, Strain::Objective);
@@ -152,7 +156,7 @@ fn coulomb_block_slides_stops_and_sticks() {
     let (g, mu) = (10.0, 0.3);
     for rule in [FrictionRule::Global, FrictionRule::Local] {
         let set_up = |pull: f64| {
-            let mesh = Mesh::block(0.1, 0.025, 16, 4, material, false).expect("valid");
+            let mesh = block([0.1, 0.025], [16, 4], material, false).expect("valid");
             let penalty = springs(&mesh, 1e8);
             let mut body = Body::new(mesh, Strain::Small);
             for j in 0..=4 {

@@ -1,8 +1,10 @@
 //! Stiffness-proportional damping against closed forms, and two states of one lightly damped case. Each test prints what it judges.
 
-use muprime_models::ridge::{
-    Body, Material, Mesh, RidgeCase, RidgeError, RunSettings, Strain, run, stability,
-};
+#[path = "ridge/block.rs"]
+mod block;
+
+use block::block;
+use muprime_models::ridge::{Body, Material, RidgeCase, RidgeError, RunSettings, Strain, run, stability};
 use std::f64::consts::PI;
 
 const SKIN: Material = Material::elastic(28.3e6, 0.33, 750.0);
@@ -11,7 +13,7 @@ const ROWS: usize = 24;
 
 /// A confined column, held at its top, with damping `beta_s`, moving in its lowest mode.
 fn column(beta_s: f64, strain: Strain) -> Body {
-    let mesh = Mesh::block(1e-4, LENGTH_M, 8, ROWS, SKIN, true).expect("valid");
+    let mesh = block([1e-4, LENGTH_M], [8, ROWS], SKIN, true).expect("valid");
     let mut body = Body::new(mesh, strain);
     body.scale_bulk_viscosity(0.0);
     body.hold_top();

@@ -1,5 +1,9 @@
 //! The element kernel against closed forms. Each test prints the number that it judges.
 
+#[path = "ridge/block.rs"]
+mod block;
+
+use block::block;
 use muprime_models::ridge::{
     Body, Material, Mesh, Plate, RidgeError, RidgeGeometry, Strain, Surface, stability,
 };
@@ -128,8 +132,7 @@ fn uniform_motion_makes_no_force() {
 fn column_swings_at_the_pressure_wave_speed() {
     let material = Material::elastic(28.3e6, 0.33, 750.0);
     let (length, rows) = (1e-3, 64);
-    let mut body =
-        Body::new(Mesh::block(1e-4, length, 8, rows, material, true).expect("valid"), Strain::Small);
+    let mut body = Body::new(block([1e-4, length], [8, rows], material, true).expect("valid"), Strain::Small);
     body.scale_bulk_viscosity(0.0);
     body.hold_top();
     for j in 0..rows {
@@ -154,7 +157,7 @@ fn cantilever_swings_at_the_beam_frequency() {
     let rows = 16;
     let mut previous = f64::NAN;
     for columns in [64, 128] {
-        let mesh = Mesh::block(length, height, columns, rows, material, false).expect("valid");
+        let mesh = block([length, height], [columns, rows], material, false).expect("valid");
         let mut body = Body::new(mesh, Strain::Small);
         body.scale_bulk_viscosity(0.0);
         let beta = 1.875_104_068_711_961_f64;
@@ -262,7 +265,7 @@ fn stable_step_is_stable_and_sharp() {
 fn confined_column_creeps_with_the_retardation_time() {
     let mut material = Material::elastic(1e6, 0.3, 1000.0);
     material.retardation_time_s = 0.2;
-    let mut body = Body::new(Mesh::block(1e-2, 1e-2, 8, 8, material, true).expect("valid"), Strain::Small);
+    let mut body = Body::new(block([1e-2, 1e-2], [8, 8], material, true).expect("valid"), Strain::Small);
     body.hold_top();
     let pressure = 10.0;
     for i in 0..=8 {
@@ -293,11 +296,11 @@ fn bad_input_is_refused() {
         Material { density_kg_m3: 0.0, ..good },
         Material { retardation_time_s: -1.0, ..good },
     ] {
-        let error = Mesh::block(1.0, 1.0, 8, 8, bad, false).expect_err("refused");
+        let error = block([1.0, 1.0], [8, 8], bad, false).expect_err("refused");
         assert!(error.to_string().contains("must be"), "{error}");
     }
-    assert!(Mesh::block(-1.0, 1.0, 8, 8, good, false).is_err());
-    assert!(Mesh::block(1.0, 1.0, 7, 8, good, false).is_err());
+    assert!(block([-1.0, 1.0], [8, 8], good, false).is_err());
+    assert!(block([1.0, 1.0], [7, 8], good, false).is_err());
     let flat = RidgeGeometry { ridge_width_m: f64::NAN, ..RidgeGeometry::TABLE_1 };
     assert!(flat.mesh([good; 3], 1500).is_err());
     assert!(RidgeGeometry::TABLE_1.mesh([good; 3], 10).is_err());

@@ -11,7 +11,6 @@ use realtime::cycle::{self, Command, CycleState, Inputs, Marker, Phase};
 use realtime::estimate::Mu0;
 use realtime::ports::{AmplifierState, Contacts, Forces, Nanos, NoData, Quality, Sample, StageState};
 use realtime::safety::{Observation, Request};
-use runs::job::sweep_in_memory;
 use runs::plan::Plan;
 use runs::setup::Setup;
 use sim::wire::SharedPlant;
@@ -21,6 +20,10 @@ use sim::world::{World, WorldConfig};
 use std::sync::Arc;
 use std::time::Instant;
 use tokio_modbus::client::Reader;
+
+#[path = "../../tests/memory.rs"]
+#[allow(dead_code, reason = "what a sweep comes to is the tests' concern")]
+mod memory;
 
 fn main() {
     divan::main();
@@ -113,7 +116,7 @@ fn sweep_in_virtual_time(bencher: Bencher<'_, '_>) {
     let plan = Plan::load("first-sweep").unwrap();
     let model: Arc<dyn FrictionModel> = Arc::new(SpringSlider::new(setup.tip.finger).unwrap());
     let run = |seed| {
-        sweep_in_memory(&setup, &plan, seed, &WorldConfig::bundled(), Arc::clone(&model), &mut |_| {})
+        memory::sweep_in_memory(&setup, &plan, seed, &WorldConfig::bundled(), Arc::clone(&model), &mut |_| {})
             .unwrap()
     };
     let cycles = run(1).cycles;

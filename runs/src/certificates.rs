@@ -59,11 +59,17 @@ impl Certificates {
             let text = crate::input::text_of(&path).map_err(|e| e.to_string())?;
             let certificate = Certificate::from_toml(&text).map_err(|e| fail(e.to_string()))?;
             let kind = certificate.kind;
+            if !matches!(kind, CertificateKind::Force | CertificateKind::Amplitude) {
+                return Err(fail(format!(
+                    "a {kind} certificate changes nothing in a run. Leave it out, and write its values where they hold: \
+                     in the fingertip, in [noise] of the setup, or in the profile"
+                )));
+            }
             if seen.contains(&kind) {
                 return Err(fail(format!("there is another {kind} certificate; which one holds?")));
             }
             seen.push(kind);
-            let serial = serial(file, kind).map_err(&fail)?.unwrap_or(certificate.instrument.serial.clone());
+            let serial = serial(file, kind).map_err(&fail)?;
             let at = Circumstances { kind, serial: &serial, now_unix_s, temperature_c: file.temperature_c };
             let verified = certificate.verify(&at).map_err(|e| fail(e.to_string()))?;
             if let (Some([low, high]), None) = (certificate.validity.temperature_c, file.temperature_c) {
@@ -161,18 +167,12 @@ impl Certificates {
     }
 }
 
-/// Serial number that a certificate of that kind must name; `None` where the setup has no such instrument.
-fn serial(file: &SetupFile, kind: CertificateKind) -> Result<Option<String>, String> {
-    let stated: Vec<Option<&String>> = match kind {
-        CertificateKind::Force => file.force.iter().map(|i| i.serial.as_ref()).collect(),
-        CertificateKind::Amplitude => vec![file.amplifier.serial.as_ref()],
-        CertificateKind::Latency
-        | CertificateKind::Phase
-        | CertificateKind::Finger
-        | CertificateKind::Sensor => return Ok(None),
-    };
-    let known: Option<Vec<&str>> = stated.into_iter().map(|s| s.map(String::as_str)).collect();
-    known.map(|serials| Some(serials.join("+"))).ok_or_else(|| {
+/// Serial number that a certificate of that kind must name.
+fn serial(file: &SetupFile, kind: CertificateKind) -> Result<String, String> {
+    let amplifier = std::slice::from_ref(&file.amplifier);
+    let instruments = if kind == CertificateKind::Force { file.force.as_slice() } else { amplifier };
+    let known: Option<Vec<&str>> = instruments.iter().map(|i| i.serial.as_deref()).collect();
+    known.map(|serials| serials.join("+")).ok_or_else(|| {
         format!("the setup must state the `serial` of the instrument that the {kind} certificate is for")
     })
 }

@@ -3,12 +3,13 @@
 //! The crate `rig` (rig/src/wall_run.rs) runs the same sequence in wall-clock time, with a thread for the
 //! loop and instruments behind drivers. Job, summary and [`RunWriter`], which writes the run's folder, serve both.
 
+mod as_sent;
 mod fast;
 pub mod licence;
 pub mod run_writer;
 mod telemetry;
 
-pub use fast::{MemorySweep, outcome_json, sweep_in_memory};
+pub use fast::outcome_json;
 pub use run_writer::{REPLAYABLE, Replayable, RunWriter, TARGET, is_model, model_name, unix_ns};
 pub use telemetry::{Deadlines, Extremes, LATENESS_BOUNDS_S, Snapshot, Snapshots};
 

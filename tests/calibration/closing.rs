@@ -13,6 +13,9 @@ name = \"force_crosstalk\"
 parameters = { lateral_per_normal = 0.08, normal_per_lateral = 0.01 }
 ";
 
+/// Force of a count of `muprime-force2` (N), as its profile states it: a certificate speaks of these counts.
+const COUNT_N: f64 = 1e-5;
+
 /// A dead-weight series on the virtual rig's own sensor, with the world's defect before it, as CSV.
 pub fn series(defects: &Defects) -> String {
     let mut sensor = Sensor::new(SensorConfig { sample_period_s: 0.01, ..SensorConfig::default() }, 0.01, 11);
@@ -46,7 +49,7 @@ pub fn series(defects: &Defects) -> String {
             let shown = sensor.feel(forces.lateral_n, forces.normal_n);
             let sample = sensor.sample(shown, realtime::ports::Nanos(tick * 10_000_000));
             if i >= 800 {
-                (0..2).for_each(|a| sum[a] += f64::from(sample.counts[a]) / 200.0);
+                (0..2).for_each(|a| sum[a] += sample.force_n[a] / COUNT_N / 200.0);
             }
         }
         let mass = if axis == "zero" { String::new() } else { mass_kg.to_string() };

@@ -13,7 +13,6 @@ use models::psi_star::{Fit, PSI_EDGE, PSI_RANGE, of_conditions, of_passes};
 use models::quantity::PeakToPeak;
 use models::surrogate::Surrogate;
 use rayon::prelude::*;
-use runs::job::sweep_in_memory;
 use runs::plan::{Plan, Resolution};
 use runs::sequence::Outcome;
 use runs::setup::Setup;
@@ -22,6 +21,7 @@ use sim::finger::Finger;
 use sim::noise::Noise;
 use sim::world::{Point, WorldConfig, steady_forces};
 use std::sync::Arc;
+use tests::memory::sweep_in_memory;
 use tests::rounds;
 
 const PLANS: [&str; 4] = ["first-sweep", "fig9-artificial", "part2-validation", "psi-reading"];

@@ -63,7 +63,12 @@ fn setup(bench: &Bench, epoch: Instant) -> (InstrumentsSetup, sim::wire::modbus_
         ..InstrumentSetup::new("ati-netft-can", "vcan0")
     };
     let slow = |id: &str| InstrumentSetup { rate_hz: Some(20.0), ..InstrumentSetup::new(id, &address) };
-    let setup = InstrumentsSetup::new(vec![force], slow("muprime-amplifier"), slow("muprime-stage"));
+    let setup = InstrumentsSetup {
+        force: vec![force],
+        amplifier: slow("muprime-amplifier"),
+        stage: slow("muprime-stage"),
+        ..Default::default()
+    };
     (setup, server)
 }
 

@@ -375,9 +375,6 @@ pub struct Effect {
     /// What it acts on over which covariates; none where nothing more than its laws is known.
     #[serde(skip)]
     pub acts: Option<Acts>,
-    /// Effects that nearly do the same, and stand in for it where it is missing: stated on one of each two.
-    #[serde(skip)]
-    pub near: &'static [&'static str],
     /// Effects of the library that together nearly do what this one does: as a pair they are not named.
     #[serde(skip)]
     pub imitated_by: &'static [&'static str],
@@ -413,7 +410,6 @@ impl Effect {
         departs_by: 1.0,
         acts: None,
         needs: &[],
-        near: &[],
         imitated_by: &[],
         words: None,
         interpolation_error: 0.0,

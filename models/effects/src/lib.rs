@@ -47,7 +47,7 @@ pub mod predict;
 
 pub use contact::Contact;
 pub use effect::{Acts, Check, Effect, Input, Law, Location, Need, Parameter, Prior, STATED_AT_N};
-pub use library::{imitated, known, library, near, one_cause, twins};
+pub use library::{imitated, known, library, one_cause, twins};
 pub use operating::{Baseline, Design, SensorError};
 pub use own::{at, by_name, own};
 pub use predict::{Active, lateral_force, read};

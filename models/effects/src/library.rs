@@ -107,12 +107,6 @@ pub fn known() -> &'static [&'static Effect] {
     KNOWN
 }
 
-/// Whether one of two effects nearly does what the other does, so that it stands in for it where that is missing.
-pub fn near(a: &str, b: &str) -> bool {
-    let states = |one: &str, other: &str| by_name(one).is_some_and(|e| e.near.contains(&other));
-    states(a, b) || states(b, a)
-}
-
 /// Whether two effects are one cause under two names: a law of one states that it does the same as a law of the other.
 pub fn one_cause(a: &str, b: &str) -> bool {
     let states = |one: &str, other: &str| {

@@ -58,7 +58,7 @@ fn every_name_referred_to_exists() {
     let names: BTreeSet<&str> = known().iter().map(|e| e.name).collect();
     assert_eq!(names.len(), known().len(), "two causes of one name");
     for effect in known() {
-        for other in effect.near.iter().chain(effect.imitated_by) {
+        for other in effect.imitated_by {
             assert!(by_name(other).is_some() && *other != effect.name, "{} names '{other}'", effect.name);
         }
         let laws: BTreeSet<&str> = effect.laws.iter().map(|l| l.name).collect();

@@ -82,22 +82,6 @@ impl Mesh {
         Ok(mesh)
     }
 
-    /// A rectangular block with equal elements, its lower left corner at the origin.
-    pub fn block(
-        width_m: f64,
-        height_m: f64,
-        nx: usize,
-        ny: usize,
-        material: Material,
-        periodic: bool,
-    ) -> Result<Mesh, RidgeError> {
-        positive("width in m", width_m)?;
-        positive("height in m", height_m)?;
-        Mesh::from_nodes(nx, vec![material; ny], periodic, |i, j| {
-            (width_m * i as f64 / nx as f64, height_m * j as f64 / ny as f64)
-        })
-    }
-
     /// Area of element `(i, j)` in m2 (per metre of depth: its volume).
     pub fn area_m2(&self, i: usize, j: usize) -> f64 {
         let s = self.stride();

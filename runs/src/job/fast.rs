@@ -1,18 +1,15 @@
 //! A sweep in virtual time: one thread, no clock, the same bytes for the same seed.
 
+use super::as_sent::AsSent;
 use super::run_writer::{self, RunWriter};
 use super::telemetry::Snapshots;
 use super::{Begun, Job, Signals, Summary, Update};
-use crate::ambient::{Answers, RigSide, World};
+use crate::ambient::{RigSide, World};
 use crate::files::Placed;
-use crate::plan::{Plan, Resolution};
-use crate::sequence::{MeasuredPass, Outcome, Reaction, Sequence};
-use crate::setup::Setup;
+use crate::sequence::{Outcome, Reaction, Sequence};
 use crate::supervisor::{self, End, OffReport, Requests, VirtualLoop};
 use miette::{IntoDiagnostic, WrapErr};
-use models::prediction::FrictionModel;
-use realtime::compare::Agreement;
-use realtime::ports::Nanos;
+use realtime::ports::{ForceSensor, Nanos};
 use realtime::recorder::Recorder;
 use realtime::turn::{Ports, Row};
 use sim::virtual_rig::{SharedRig, VirtualRig};
@@ -44,7 +41,7 @@ pub fn run(
     let world = VirtualRig { world: job.world()? }.split();
     let air = World::Virtual(world[0].clone());
     let mut rig_side = RigSide::open(&sequence, None, Some(air), answers)?;
-    let ports = ports_of(&job, world);
+    let ports = ports_of(&job, world)?;
     let preamble = run_writer::preamble(&job, EPOCH_UNIX_NS)?;
     let mut writer = RunWriter::begin(&job, dir, planned)?;
     let rig =
@@ -67,8 +64,14 @@ pub fn run(
 }
 
 /// What the loop of a job has to do with: the virtual rig, through the setup's certificates.
-fn ports_of(job: &Job, [force, amplifier, stage]: [SharedRig; 3]) -> Ports {
-    let ports = Ports::new(Box::new(force), Box::new(amplifier), Box::new(stage.clone()));
+fn ports_of(job: &Job, [force, amplifier, stage]: [SharedRig; 3]) -> miette::Result<Ports> {
+    let force: Box<dyn ForceSensor> = match &job.setup.certificates.force {
+        None => Box::new(force),
+        Some(_) => {
+            Box::new(AsSent::new(force, &job.setup.file).map_err(|problem| miette::miette!("{problem}"))?)
+        }
+    };
+    let ports = Ports::new(force, Box::new(amplifier), Box::new(stage.clone()));
     let mut ports = job.setup.certificates.applied(ports);
     if job.setup.file.supply_relay.is_some() {
         ports.supply = Box::new(stage.clone());
@@ -76,7 +79,7 @@ fn ports_of(job: &Job, [force, amplifier, stage]: [SharedRig; 3]) -> Ports {
     if job.setup.file.safety_inputs.is_some() {
         ports.contacts = Box::new(stage);
     }
-    ports
+    Ok(ports)
 }
 
 /// Sweeps, and ends the record; says what became of the output too.
@@ -142,54 +145,6 @@ fn sweep(
         Ok(outcome)
     };
     (ended(), off)
-}
-
-/// What a sweep in memory comes to.
-#[derive(Clone, Debug)]
-pub struct MemorySweep {
-    /// The passes.
-    pub passes: Vec<MeasuredPass>,
-    /// How it ended.
-    pub outcome: Outcome,
-    /// What they say of the model in the end.
-    pub agreement: Agreement,
-    /// Cycles run.
-    pub cycles: u64,
-}
-
-/// Runs a plan on a world in virtual time and keeps nothing: for statistics, and to see beforehand what a plan shows.
-/// `each` takes every row.
-///
-/// # Errors
-/// A plan that the limits do not allow, or a world that cannot be.
-pub fn sweep_in_memory(
-    setup: &Setup,
-    plan: &Plan,
-    seed: u64,
-    world: &sim::world::WorldConfig,
-    model: Arc<dyn FrictionModel>,
-    each: &mut dyn FnMut(&Row),
-) -> miette::Result<MemorySweep> {
-    let resolution = Resolution { amplitude_pp_m: 1e-9, frequency_hz: 0.1 };
-    let points = plan.points(seed, &setup.config.limits, &resolution)?;
-    let mut sequence =
-        Sequence::new(points, plan.file.pass, Arc::clone(&model), &setup.tip, setup.file.noise)
-            .at_rig(plan, setup);
-    let [force, amplifier, stage] =
-        VirtualRig::new(world, seed).map_err(|e| miette::miette!("the virtual rig: {e}"))?.split();
-    let air = World::Virtual(force.clone());
-    let mut rig_side = RigSide::open(&sequence, None, Some(air), Answers::Simulated)?;
-    let ports = Ports::new(Box::new(force), Box::new(amplifier), Box::new(stage));
-    let mut rig = VirtualLoop::new(setup.config, model, ports);
-    let mut passes = Vec::new();
-    let outcome =
-        supervisor::sweep(&mut rig, &mut sequence, &mut Requests::default, &mut |row, sequence, reaction| {
-            rig_side.serve(row.now, sequence, &reaction);
-            each(row);
-            passes.extend(reaction.pass);
-        });
-    let agreement = sequence.agreement(outcome == Outcome::Complete);
-    Ok(MemorySweep { passes, outcome, agreement, cycles: rig.cycles() })
 }
 
 /// An outcome as JSON, for the record's last words.

@@ -56,11 +56,6 @@ impl VirtualLoop {
         self.config.limits.timing.cycle
     }
 
-    /// Cycles run.
-    pub fn cycles(&self) -> u64 {
-        self.number
-    }
-
     /// Stops the rig and lets the stop reach it, so that the last rows show the safe state.
     pub fn end(mut self, each: &mut dyn FnMut(&Row)) -> OffReport {
         self.stop();

@@ -112,6 +112,11 @@ impl Device {
         &self.profile
     }
 
+    /// What its frames of constants say, such as a calibration.
+    pub fn constants(&self) -> &Values {
+        &self.constants
+    }
+
     /// The bytes of one frame, all of one moment of the world.
     pub fn frame(&mut self, frame: FrameId, plant: &mut dyn Plant, now: Nanos) -> Vec<u8> {
         let mut bytes = vec![0; self.profile.frame_bytes(frame)];

@@ -232,11 +232,12 @@ fn each_unit_of_a_cell_of_two_shows_its_own_axis() {
         ..InstrumentSetup::new("hbk-wtx110", any)
     };
     let at = |id: &str| InstrumentSetup::new(id, "127.0.0.1:0");
-    let mut setup = InstrumentsSetup::new(
-        vec![unit(11, axis("net", -1.0), None), unit(12, None, axis("net", 1.0))],
-        at("muprime-amplifier"),
-        at("muprime-stage"),
-    );
+    let mut setup = InstrumentsSetup {
+        force: vec![unit(11, axis("net", -1.0), None), unit(12, None, axis("net", 1.0))],
+        amplifier: at("muprime-amplifier"),
+        stage: at("muprime-stage"),
+        ..Default::default()
+    };
     setup.amplifier.unit = Some(2);
     let _served = rig::emulators::serve(&mut setup, &plant(&bench, epoch), false).unwrap();
     let mut rig = drivers::open(&setup, epoch).unwrap();

@@ -39,11 +39,12 @@ pub fn plant(bench: &Bench, epoch: Instant) -> SharedPlant {
 /// A setup whose amplifier and stage stand at a Modbus TCP server, to put one other instrument in.
 pub fn setup(server: SocketAddr) -> InstrumentsSetup {
     let address = server.to_string();
-    InstrumentsSetup::new(
-        vec![InstrumentSetup::new("muprime-force2", &address)],
-        InstrumentSetup::new("muprime-amplifier", &address),
-        InstrumentSetup::new("muprime-stage", &address),
-    )
+    InstrumentsSetup {
+        force: vec![InstrumentSetup::new("muprime-force2", &address)],
+        amplifier: InstrumentSetup::new("muprime-amplifier", &address),
+        stage: InstrumentSetup::new("muprime-stage", &address),
+        ..Default::default()
+    }
 }
 
 pub fn axes(profile: &str, address: &str) -> InstrumentSetup {
@@ -126,11 +127,12 @@ fn the_rigs_own_instruments_over_rtu() {
         emulators.push(SerialEmulator::modbus_rtu(port, devices, plant(&bench, epoch)).unwrap());
         InstrumentSetup { baud: Some(115_200), ..InstrumentSetup::new(id, &format!("rtu:{path}")) }
     };
-    let setup = InstrumentsSetup::new(
-        vec![at(1, "muprime-force2")],
-        at(2, "muprime-amplifier"),
-        at(3, "muprime-stage"),
-    );
+    let setup = InstrumentsSetup {
+        force: vec![at(1, "muprime-force2")],
+        amplifier: at(2, "muprime-amplifier"),
+        stage: at(3, "muprime-stage"),
+        ..Default::default()
+    };
     let mut rig = drivers::open(&setup, epoch).unwrap();
     let forces =
         eventually("forces", || Some(rig.force.read(now(epoch))).filter(|forces| forces.normal.is_ok()));

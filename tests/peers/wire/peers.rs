@@ -37,11 +37,12 @@ fn a_replayed_friction_trace_comes_out_of_the_driver() {
         start(python().arg(file("tests/peers/replay_server.py")).arg(&recording).arg("200"));
     let (bench, epoch) = (Bench::default(), Instant::now());
     let server = bench::serve_all(&bench, epoch);
-    let mut setup = InstrumentsSetup::new(
-        vec![InstrumentSetup::new("muprime-force2", &format!("127.0.0.1:{port}"))],
-        InstrumentSetup::new("muprime-amplifier", &server.address().to_string()),
-        InstrumentSetup::new("muprime-stage", &server.address().to_string()),
-    );
+    let mut setup = InstrumentsSetup {
+        force: vec![InstrumentSetup::new("muprime-force2", &format!("127.0.0.1:{port}"))],
+        amplifier: InstrumentSetup::new("muprime-amplifier", &server.address().to_string()),
+        stage: InstrumentSetup::new("muprime-stage", &server.address().to_string()),
+        ..Default::default()
+    };
     setup.force[0].rate_hz = Some(500.0);
     let mut rig = drivers::open(&setup, epoch).unwrap();
     let mut seen = BTreeMap::new();

@@ -14,11 +14,12 @@ use wall::bench::{self, Bench, eventually, now, opened};
 /// A setup whose instruments all stand at one address.
 fn setup(address: SocketAddr) -> InstrumentsSetup {
     let address = address.to_string();
-    InstrumentsSetup::new(
-        vec![InstrumentSetup::new("muprime-force2", &address)],
-        InstrumentSetup::new("muprime-amplifier", &address),
-        InstrumentSetup::new("muprime-stage", &address),
-    )
+    InstrumentsSetup {
+        force: vec![InstrumentSetup::new("muprime-force2", &address)],
+        amplifier: InstrumentSetup::new("muprime-amplifier", &address),
+        stage: InstrumentSetup::new("muprime-stage", &address),
+        ..Default::default()
+    }
 }
 
 #[test]

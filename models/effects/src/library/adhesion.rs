@@ -50,7 +50,6 @@ pub(super) static EFFECT: Effect = Effect {
         )
         .needs(&[Need::Humidities]),
     ],
-    near: &["normal_offset"],
     needs: &[Need::Loads],
     change: |law, theta, pass, design, c| {
         match law {

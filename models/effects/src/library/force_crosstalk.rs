@@ -26,7 +26,6 @@ pub(super) static EFFECT: Effect = Effect {
             ),
     ],
     departs_by: 0.05,
-    near: &["plate_tilt"],
     acts: Some(Acts { on: Input::Crosstalk, over: &[&covariate::NORMAL_FORCE, &covariate::POSITION] }),
     needs: &[Need::Directions],
     change: |law, theta, pass, _, c| {

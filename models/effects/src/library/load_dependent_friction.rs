@@ -18,7 +18,6 @@ pub(super) static EFFECT: Effect = Effect {
             &[Parameter::signed("inverse_load", "1/N", 0.8, -0.6, 8.0)],
         ),
     ],
-    near: &["adhesion", "normal_offset"],
     acts: Some(Acts { on: Input::Friction, over: &[&covariate::NORMAL_FORCE] }),
     needs: &[Need::Loads],
     change: |law, theta, _, design, c| {

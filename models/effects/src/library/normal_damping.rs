@@ -26,7 +26,6 @@ pub(super) static EFFECT: Effect = Effect {
         // A dashpot that grows with the indentation, so that the force does not jump at touch-down.
         Law::new("Hunt and Crossley", &[Parameter::positive("damping_per_speed", "s/m", 6.0, 60.0)]),
     ],
-    near: &["ridge_inertia"],
     needs: &[Need::Vibration],
     change: |law, theta, _, design, c| {
         if law == 3 {

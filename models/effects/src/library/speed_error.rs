@@ -49,7 +49,6 @@ pub(super) static EFFECT: Effect = Effect {
             .needs(&[Need::Directions])
             .seen_by(CHECK, 0.003),
     ],
-    near: &["amplitude_miscalibration"],
     acts: Some(Acts { on: Input::Speed, over: &[&covariate::SPEED] }),
     needs: &[Need::Vibration],
     change: |law, theta, pass, design, c| match law {

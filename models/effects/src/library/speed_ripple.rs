@@ -20,7 +20,6 @@ pub(super) static EFFECT: Effect = Effect {
             Parameter::signed("second_harmonic_cosine", "1", 0.3, -1.0, 1.0).bending(),
         ],
     )],
-    near: &["mode_shape"],
     needs: &[Need::Vibration, Need::Positions],
     change: |_, theta, pass, design, c| {
         let (sin, cos) = (2.0 * PI * (pass.position_m / theta[1] + theta[2])).sin_cos();

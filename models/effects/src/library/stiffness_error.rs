@@ -38,7 +38,6 @@ pub(super) static EFFECT: Effect = Effect {
         )
         .needs(&[Need::Directions]),
     ],
-    near: &["speed_error", "amplitude_miscalibration", "subsurface_relaxation"],
     acts: Some(Acts { on: Input::Stiffness, over: &[&covariate::NORMAL_FORCE] }),
     needs: &[Need::Vibration],
     change: |law, theta, pass, design, c| {

@@ -32,7 +32,6 @@ pub(super) static EFFECT: Effect = Effect {
             ],
         ),
     ],
-    near: &["speed_error", "amplitude_miscalibration", "resonance_detuning"],
     acts: Some(Acts { on: Input::Stiffness, over: &[&covariate::TIME] }),
     needs: &[Need::Vibration, Need::Time],
     change: |law, theta, pass, _, c| {

@@ -87,11 +87,6 @@ fn compatible(a: usize, b: usize) -> bool {
 }
 
 impl Tally {
-    /// Runs a scene and counts it.
-    pub fn take(&mut self, scene: &Scene, twice: bool) {
-        self.count(scene, judged(scene, twice), twice);
-    }
-
     /// Counts what came of a scene.
     pub fn count(&mut self, scene: &Scene, found: Found, twice: bool) {
         self.scenes += 1;
