@@ -2,7 +2,7 @@
 
 use crate::bench::{Coverage, seed, trials};
 use crate::bound::{information, jacobian};
-use calibration::force::dynamics::{second_order_step, step_response};
+use calibration::force::dynamics::{second_order_step, step_responses};
 use calibration::latency::{channel_delay, clock};
 use calibration::uncertainty::student::coverage_factor;
 use nalgebra::DMatrix;
@@ -80,7 +80,7 @@ fn delays_and_clock_drift_are_covered_as_stated() {
                     value.push(f64::from(sample.counts[0]));
                 }
             }
-            delays.push(step_response(&time, &value, 0.0).unwrap().delay_s[0]);
+            delays.push(step_responses(&[(time, value)], 0.0).unwrap()[0].delay_s[0]);
         }
         let found = channel_delay("force", &delays, 0.0).unwrap().delay;
         let half = coverage_factor(0.95, found.degrees_of_freedom) * found.standard_uncertainty;

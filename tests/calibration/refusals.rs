@@ -332,3 +332,27 @@ fn a_table_with_other_separators_is_refused_by_their_name_and_a_byte_order_mark_
         .unwrap();
     assert!(said.status.success(), "{}", tests::texts(&said).1);
 }
+
+/// Such a certificate was taken in a setup, whatever its serial, and did nothing.
+#[test]
+fn a_certificate_that_changes_nothing_in_a_run_is_refused_in_a_setup() {
+    let folder = tempfile::tempdir().unwrap();
+    let mut noise = Noise::new(5, "at rest");
+    let rest = table("lateral_counts,normal_counts", 4000, |_| {
+        format!("{},{}", (20.0 * noise.normal()).round(), (20.0 * noise.normal()).round())
+    });
+    std::fs::write(folder.path().join("rest.csv"), rest).unwrap();
+    let made = "calibrate noise rest.csv --rate-hz 1000 --operator Ada --serial N-1 --out noise.toml";
+    let made = tests::muprime().current_dir(folder.path()).args(made.split(' ')).output().unwrap();
+    assert!(made.status.success(), "{}", tests::texts(&made).1);
+    let setup = std::fs::read_to_string(tests::file("runs/setups/virtual-ideal.toml")).unwrap();
+    let with = setup.replace("name = \"virtual-ideal\"", "name = \"x\"\ncertificates = [\"noise.toml\"]");
+    std::fs::write(folder.path().join("setup.toml"), with).unwrap();
+    for args in ["check setup.toml", "run --fast --setup setup.toml --out r"] {
+        let answer = tests::muprime().current_dir(folder.path()).args(args.split(' ')).output().unwrap();
+        let text = tests::texts(&answer).1.split_whitespace().collect::<Vec<_>>().join(" ");
+        assert_eq!(answer.status.code(), Some(2), "{text}");
+        assert!(text.contains("changes nothing in a run"), "{text}");
+    }
+    assert!(!folder.path().join("r").exists());
+}

@@ -3,7 +3,8 @@
 use super::{Outcome, Sources, columns};
 use calibration::certificate::{Finding, Residuals};
 use calibration::force::characteristics::outcome;
-use calibration::force::dynamics::{Estimate, ring_down, step_response};
+use calibration::force::dynamics::{Estimate, StepResponse, ring_down, step_responses};
+use calibration::regression::FitError;
 use calibration::uncertainty::Input;
 use std::path::PathBuf;
 
@@ -15,58 +16,71 @@ pub struct Args {
     samples: PathBuf,
 }
 
-/// One event's answer: what it found, and standard deviation and largest of what the fit left.
-type Event = (Vec<Estimate>, [f64; 2]);
+/// Times in s and values of one event.
+type Record = (Vec<f64>, Vec<f64>);
 
-/// A step of force: second-order low-pass with dead time.
+/// One event's answer: names, units and values of what it found, and standard deviation and largest of what the fit left.
+type Event = (Vec<(&'static str, &'static str, Estimate)>, [f64; 2]);
+
+/// Steps of force: a low-pass with dead time, of second order or of first.
 pub fn step(args: &Args, sources: &mut Sources) -> miette::Result<Outcome> {
-    const NAMES: [(&str, &str); 4] = [
-        ("step.delay", "s"),
-        ("step.natural_frequency", "Hz"),
-        ("step.damping_ratio", "1"),
-        ("step.bandwidth", "Hz"),
-    ];
-    let model =
-        "value = base + height step(t - delay) of a second-order low-pass; bandwidth where it is 3 dB down";
-    run(args, sources, &NAMES, model, f64::NEG_INFINITY, |time, value| {
-        let found = step_response(time, value, 0.0)?;
-        let all = vec![found.delay_s, found.natural_frequency_hz, found.damping_ratio, found.bandwidth_hz];
-        Ok((all, found.residual))
+    run(args, sources, f64::NEG_INFINITY, |records| {
+        let found = step_responses(records, 0.0)?;
+        let event = |step: &StepResponse| {
+            let mut all = vec![("step.delay", "s", step.delay_s)];
+            if let Some([natural_hz, damping]) = step.second_order {
+                let frequency = ("step.natural_frequency", "Hz", natural_hz);
+                all.extend([frequency, ("step.damping_ratio", "1", damping)]);
+            }
+            all.push(("step.bandwidth", "Hz", step.bandwidth_hz));
+            (all, step.residual)
+        };
+        let second = "value = base + height step(t - delay) of a second-order low-pass; bandwidth where it is 3 dB down";
+        let first = "value = base + height (1 - exp(-(t - delay) 2 pi bandwidth)): a first-order low-pass, whose natural \
+                     frequency and damping nothing determines";
+        let model = if found[0].second_order.is_some() { (second, 5.0) } else { (first, 4.0) };
+        Ok((model, found.iter().map(event).collect()))
     })
 }
 
-/// A tap: the free decay of the mount.
+/// Taps: the free decay of the mount.
 pub fn tap(args: &Args, sources: &mut Sources) -> miette::Result<Outcome> {
-    const NAMES: [(&str, &str); 2] = [("mount.resonance", "Hz"), ("mount.damping_ratio", "1")];
-    let model = "value = c + exp(-zeta omega t) (p cos(omega_d t) + q sin(omega_d t))";
-    run(args, sources, &NAMES, model, 0.0, |time, value| {
-        let found = ring_down(time, value)?;
-        Ok((vec![found.frequency_hz, found.damping_ratio], found.residual))
+    run(args, sources, 0.0, |records| {
+        let event = |(k, (time, value)): (usize, &Record)| {
+            let found = ring_down(time, value).map_err(|e| (k, e))?;
+            let damping = ("mount.damping_ratio", "1", found.damping_ratio);
+            Ok((vec![("mount.resonance", "Hz", found.frequency_hz), damping], found.residual))
+        };
+        let model = "value = c + exp(-zeta omega t) (p cos(omega_d t) + q sin(omega_d t))";
+        Ok(((model, 5.0), records.iter().enumerate().map(event).collect::<Result<_, _>>()?))
     })
 }
 
+/// `fit` gives the model with the number of its parameters, and what each event found.
 fn run(
     args: &Args,
     sources: &mut Sources,
-    names: &[(&str, &'static str)],
-    model: &str,
     from_s: f64,
-    fit: impl Fn(&[f64], &[f64]) -> Result<Event, calibration::regression::FitError>,
+    fit: impl Fn(&[Record]) -> Result<((&'static str, f64), Vec<Event>), (usize, FitError)>,
 ) -> miette::Result<Outcome> {
     let rows = columns(sources, &args.samples, ["event", "time_s", "value"], &[])?;
     let shown = args.samples.display();
-    let mut events: Vec<Event> = Vec::new();
-    for event in rows.chunk_by(|a, b| a[0] == b[0]) {
-        let (time, value): (Vec<f64>, Vec<f64>) = event.iter().map(|r| (r[1], r[2])).unzip();
-        let refused = |why: &dyn std::fmt::Display| miette::miette!("{shown}: event {}: {why}", event[0][0]);
+    let numbered: Vec<&[[f64; 3]]> = rows.chunk_by(|a, b| a[0] == b[0]).collect();
+    let refused = |k: usize, why: &dyn std::fmt::Display| {
+        miette::miette!("{shown}: event {}: {why}", numbered[k][0][0])
+    };
+    let records: Vec<Record> =
+        numbered.iter().map(|event| event.iter().map(|r| (r[1], r[2])).unzip()).collect();
+    for (k, (time, _)) in records.iter().enumerate() {
         if time.windows(2).any(|w| w[1] <= w[0]) {
-            return Err(refused(&"time_s must rise from row to row"));
+            return Err(refused(k, &"time_s must rise from row to row"));
         }
         if time[0] < from_s {
-            return Err(refused(&"it begins before its tap: only the free decay after it is fitted"));
+            return Err(refused(k, &"it begins before its tap: only the free decay after it is fitted"));
         }
-        events.push(fit(&time, &value).map_err(|e| refused(&format!("no certificate: {e}")))?);
     }
+    let fitted = fit(&records).map_err(|(k, e)| refused(k, &format!("no certificate: {e}")))?;
+    let ((model, parameters), events) = fitted;
     let mut remarks = Vec::new();
     if events.len() == 2 {
         miette::bail!("{shown}: two events say little of their scatter: give one, or at least three");
@@ -76,16 +90,17 @@ fn run(
             "one event: uncertainties are those of its fit, from event to event they are unknown".into(),
         );
     }
-    let finding = |(k, (name, unit)): (usize, &(&str, &'static str))| match events.as_slice() {
-        // Both models have five parameters.
-        [one] => Finding::new(*name, *unit, one.0[k], rows.len() as f64 - 5.0),
-        all => {
-            let values: Vec<f64> = all.iter().map(|e| e.0[k][0]).collect();
-            let mean = Input::type_a(&values);
-            Finding::new(*name, *unit, [mean.value, mean.standard_uncertainty], mean.degrees_of_freedom)
+    let finding = |k: usize| {
+        let (name, unit, estimate) = events[0].0[k];
+        match events.as_slice() {
+            [_] => Finding::new(name, unit, estimate, rows.len() as f64 - parameters),
+            all => {
+                let mean = Input::type_a(&all.iter().map(|e| e.0[k].2[0]).collect::<Vec<f64>>());
+                Finding::new(name, unit, [mean.value, mean.standard_uncertainty], mean.degrees_of_freedom)
+            }
         }
     };
-    let findings: Vec<Finding> = names.iter().enumerate().map(finding).collect();
+    let findings: Vec<Finding> = (0..events[0].0.len()).map(finding).collect();
     let n = events.len() as f64;
     let count = rows.len() as u64;
     let sd = (events.iter().map(|e| e.1[0].powi(2)).sum::<f64>() / n).sqrt();

@@ -1,7 +1,7 @@
 //! `muprime calibrate latency`.
 
 use super::{Outcome, Sources, columns};
-use calibration::force::dynamics::step_response;
+use calibration::force::dynamics::step_responses;
 use calibration::latency::{channel_delay, clock, outcome};
 use calibration::uncertainty::Input;
 use std::path::PathBuf;
@@ -41,14 +41,12 @@ pub fn outcome_of(args: &Args, sources: &mut Sources) -> miette::Result<Outcome>
     for given in &args.steps {
         let (channel, path) = split(given)?;
         let rows = columns(sources, &path, ["edge", "time_s", "value"], &[])?;
-        let (mut delays, mut bandwidths) = (Vec::new(), Vec::new());
-        for edge in rows.chunk_by(|a, b| a[0] == b[0]) {
-            let (time, value): (Vec<f64>, Vec<f64>) = edge.iter().map(|r| (r[1], r[2])).unzip();
-            let found = step_response(&time, &value, 0.0)
-                .map_err(|e| miette::miette!("{}: edge {}: {e}", path.display(), edge[0][0]))?;
-            delays.push(found.delay_s[0]);
-            bandwidths.push(found.bandwidth_hz[0]);
-        }
+        let edges: Vec<&[[f64; 3]]> = rows.chunk_by(|a, b| a[0] == b[0]).collect();
+        let records: Vec<_> = edges.iter().map(|edge| edge.iter().map(|r| (r[1], r[2])).unzip()).collect();
+        let found = step_responses(&records, 0.0)
+            .map_err(|(k, e)| miette::miette!("{}: edge {}: {e}", path.display(), edges[k][0][0]))?;
+        let (delays, bandwidths): (Vec<f64>, Vec<f64>) =
+            found.iter().map(|f| (f.delay_s[0], f.bandwidth_hz[0])).unzip();
         channels.push(delay(channel, &delays, given)?);
         let Input { value, standard_uncertainty: u, .. } = Input::type_a(&bandwidths);
         remarks.push(format!("{channel}: bandwidth {value:.2} Hz, standard uncertainty {u:.2} Hz"));

@@ -6,7 +6,7 @@
 //! whose coverage the trials judge: the truth within four standard uncertainties, for the delay one-sided as well the
 //! time that the bus itself may take. How many lie within their 95 % intervals is printed.
 
-use calibration::force::dynamics::step_response;
+use calibration::force::dynamics::step_responses;
 use calibration::force::series::Weighing;
 use calibration::latency::channel_delay;
 use models::prediction::{FrictionModel, SpringSlider};
@@ -317,7 +317,7 @@ fn a_withheld_lag_is_found_over_modbus_and_can() {
             let (time, value): (Vec<f64>, Vec<f64>) = samples.iter().map(|(t, v)| (t - event, *v)).unzip();
             // An edge that the machine slept through has no samples about it.
             let gap = time.windows(2).map(|w| w[1] - w[0]).fold(0.0, f64::max);
-            match step_response(&time, &value, 0.0) {
+            match step_responses(&[(time, value)], 0.0).map(|found| found[0]) {
                 Ok(found) if gap < 0.02 => {
                     delays.push(found.delay_s[0]);
                     bandwidths.push(found.bandwidth_hz[0]);
