@@ -10,6 +10,7 @@ use models::condition::Condition;
 use models::covariate;
 use models::quantity::PeakToPeak;
 use serde::Serialize;
+use statrs::distribution::{ChiSquared, ContinuousCDF};
 use std::collections::BTreeMap;
 
 /// What the replicates say about the stated repeatability.
@@ -25,6 +26,8 @@ pub struct PureError {
 
 /// Relative step in the normal force for the slope of a prediction.
 const LOAD_STEP: f64 = 0.01;
+/// Chance of error at which replicates exclude a factor on the stated variance.
+const EXCLUDED: f64 = 1e-3;
 /// Least variance of a pass, N^2.
 const LEAST_VARIANCE: f64 = 1e-12;
 /// Replicates lie this close together: share of the duration, and of the stroke.
@@ -101,7 +104,7 @@ fn replicates(table: &Table, problem: &Problem, variance: &[f64], scatter: &Scat
         let key = covariate::SETTINGS.map(|c| Some(c.level?(c.of(&own)?)));
         groups.entry(key).or_default().push(i);
     }
-    let (mut sum, mut freedom) = (0.0, 0usize);
+    let (mut sum, mut largest, mut freedom) = (0.0, 0.0_f64, 0usize);
     // What lasts is half the same in neighbours, and the rest of it is no repeatability.
     let lasting = scatter.lasting(table, &problem.constants, variance);
     for rows in groups.values().filter(|r| r.len() > 1) {
@@ -119,18 +122,39 @@ fn replicates(table: &Table, problem: &Problem, variance: &[f64], scatter: &Scat
             // What regulation leaves of the load's scatter is taken out along the smooth surface.
             let difference = (table.lateral[i] - scatter.level[i]) - (table.lateral[j] - scatter.level[j]);
             let moved = (lasting.row(i) - lasting.row(j)).norm_squared();
-            sum += difference * difference / (variance[i] + variance[j] + moved);
-            freedom += 1;
+            let square = difference * difference / (variance[i] + variance[j] + moved);
+            (sum, largest, freedom) = (sum + square, largest.max(square), freedom + 1);
         }
     }
     let k = &problem.constants;
-    let repeated = (k.stated_freedom + sum) / (k.stated_freedom + freedom as f64);
-    // Scatter below the statement is believed only as far as the replicates carry it.
-    let repeated = repeated.clamp(k.variance_factor_bounds[0], k.variance_factor_bounds[1]);
+    // Where the replicates exclude the upper bound, were the two that differ most none, the statement is wrong, and they
+    // alone count. Scatter below the statement is believed only as far as they carry it.
+    let [low, high] = k.variance_factor_bounds;
+    let least = quotient(sum - largest, freedom.saturating_sub(1), 1.0 - EXCLUDED);
+    let repeated = match least {
+        Some(least) if least > high => sum / freedom as f64,
+        _ => ((k.stated_freedom + sum) / (k.stated_freedom + freedom as f64)).clamp(low, high),
+    };
     let used =
         repeated * (scatter.bare_scale.powi(2) / repeated).max(1.0).powf(believed(k, scatter, sum, freedom));
     let variance_ratio = (freedom > 0).then(|| sum / freedom as f64);
     PureError { degrees_of_freedom: freedom, variance_ratio, used }
+}
+
+/// A sum of squares over a quantile of chi squared: the end of the interval of their variance.
+fn quotient(sum: f64, freedom: usize, share: f64) -> Option<f64> {
+    Some(sum / ChiSquared::new(freedom as f64).ok()?.inverse_cdf(share))
+}
+
+impl PureError {
+    /// How many times as much as stated the replicates scatter, where they exclude the factor that was used.
+    pub fn excludes_the_used(&self) -> Option<f64> {
+        let sum = self.variance_ratio? * self.degrees_of_freedom as f64;
+        let [low, high] =
+            [1.0 - EXCLUDED, EXCLUDED].map(|share| quotient(sum, self.degrees_of_freedom, share));
+        let within = low? <= self.used && self.used <= high?;
+        (!within).then(|| (sum / self.degrees_of_freedom as f64).sqrt())
+    }
 }
 
 /// How far a scatter about the recalibrated baseline is scatter, and no structure that no surface follows:

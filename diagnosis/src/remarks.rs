@@ -3,7 +3,7 @@
 use crate::bases::Bends;
 use crate::data::Table;
 use crate::decision::{Decision, Verdict};
-use crate::format::probability;
+use crate::format::{probability, three_digits};
 use crate::hypotheses::{Candidate, Fitted};
 use crate::kernel::scaled;
 use crate::scatter::Scatter;
@@ -185,7 +185,16 @@ pub fn of_scatter(fitted: &Fitted, decision: &Decision, with_suspects: Option<&W
     let k = &fitted.problem.constants;
     let scatter = &fitted.scatter;
     let mut remarks = Vec::new();
-    if scatter.scale > k.misstated || scatter.scale < 1.0 / k.misstated {
+    let misstated = |scale: f64| scale > k.misstated || scale < 1.0 / k.misstated;
+    let repeats = fitted.pure.excludes_the_used().filter(|repeats| misstated(*repeats));
+    if let Some(repeats) = repeats {
+        remarks.push(format!(
+            "Passes under the same conditions scatter {} times as much as rig.toml states; a scatter of {:.2} times the stated \
+             one was used. Correct [noise] in rig.toml, or say which passes are no repeats.",
+            three_digits(repeats),
+            scatter.scale
+        ));
+    } else if misstated(scatter.scale) {
         remarks.push(format!(
             "Passes scatter {:.2} times as much as rig.toml states; the measured scatter was used.{}",
             scatter.scale,
