@@ -95,7 +95,7 @@ fn the_bytes_know_no_engine_no_order_no_ranges_and_no_threads() {
 }
 
 #[test]
-fn folders_of_shards_stay_small_and_the_former_layout_is_read() {
+fn folders_of_shards_stay_small() {
     let folder = tempfile::tempdir().unwrap();
     for (cases, step) in [(2_500, 1), (100_000_000, 400)] {
         let study =
@@ -107,16 +107,6 @@ fn folders_of_shards_stay_small_and_the_former_layout_is_read() {
         }
         assert!(count.len() <= 1000 && count.values().all(|n| *n <= 1000), "{} folders", count.len());
     }
-    let (cases, out) = (noop(folder.path(), 40, 0), folder.path().join("former"));
-    let wanted = here(&cases, &out);
-    let within = out.join("shards/0000");
-    for entry in std::fs::read_dir(&within).unwrap().map(Result::unwrap) {
-        std::fs::rename(entry.path(), out.join("shards").join(entry.file_name())).unwrap();
-    }
-    std::fs::remove_dir(&within).unwrap();
-    assert_eq!(gathered(&out), wanted);
-    let again = submitted(&cases, &out, &[]);
-    assert_eq!((&again["there"], &again["tasks"]), (&40.into(), &0.into()));
 }
 
 #[test]
@@ -217,6 +207,18 @@ fn gathering_refuses_holes_contradictions_and_mixed_versions() {
     let again = run(&mut worker(&cases, &out, "10..20"));
     assert!(again.status.success() && texts(&again).1.contains("set aside"), "{:?}", texts(&again));
     assert_eq!(gathered(&out), wanted);
+    // So does the documented way to go on, which read names alone.
+    std::fs::write(&whole, &kept[..kept.len() / 2]).unwrap();
+    assert!(refused().contains("sets it aside"));
+    let plan = said(&["submit", text(&cases), "--out", text(&out), "--plan", "--case-s", "0.001"]);
+    assert_eq!(plan["tasks"][0]["range"], serde_json::json!([10, 15]), "{plan}");
+    submitted(&cases, &out, &[]);
+    assert_eq!(gathered(&out), wanted);
+    let moved = folder.path().join("moved.jsonl");
+    std::fs::rename(&cases, &moved).unwrap();
+    assert!(refusal(&["gather", text(&out)]).contains("is gone help: --cases FILE"));
+    assert_eq!(said(&["gather", text(&out), "--cases", text(&moved)])["sha256"], wanted);
+    std::fs::rename(&moved, &cases).unwrap();
     // Another study does not get into the folder, and results of changed inputs are not taken for those that are there.
     let other = noop(&folder.path().canonicalize().unwrap(), 31, 0);
     let why = refusal(&["case", "--cases", text(&other), "--out", text(&out), "--index", "0"]);
@@ -328,4 +330,27 @@ fn a_study_whose_cases_all_fail_is_a_failure_and_a_variable_stated_twice_is_refu
         (Some(1), &2.into(), &0.into()),
         "{document}"
     );
+}
+
+/// Submitting again said that all is there, with the results of the table before.
+#[test]
+fn a_table_that_was_changed_since_is_no_complete_study() {
+    let folder = tempfile::tempdir().unwrap();
+    let at = |name: &str| folder.path().join(name);
+    let swept = run(muprime().args(["run", "--fast", "--setup", "virtual-ideal", "--out", text(&at("r"))]));
+    assert!(swept.status.success(), "{:?}", texts(&swept));
+    let (cases, out) = (at("c.jsonl"), at("study"));
+    said(&["cases", "diagnose", text(&at("r")), "--no-pairs", "-o", text(&cases)]);
+    submitted(&cases, &out, &["--case-s", "2"]);
+    let table = at("r/points.csv");
+    let points = std::fs::read_to_string(&table).unwrap();
+    let fewer: String = points.split_inclusive('\n').take(points.lines().count() - 2).collect();
+    std::fs::write(&table, fewer).unwrap();
+    let share = ["case", "--cases", text(&cases), "--out", text(&out), "--task", "0", "--of", "1"];
+    for again in [&["submit", text(&cases), "--out", text(&out)][..], &share] {
+        let why = refusal(again);
+        assert!(why.contains("is of other cases than those of") && why.contains("help: the cases"), "{why}");
+    }
+    std::fs::write(&table, points).unwrap();
+    assert_eq!(submitted(&cases, &out, &[])["missing"], 0);
 }

@@ -91,6 +91,10 @@ pub fn gather(study: &Study, to: &Path, any_build: bool) -> miette::Result<Gathe
     if let Some(beyond) = there.iter().find(|r| r.end > cases) {
         miette::bail!("{}: the study has {cases} cases only", study.shard(beyond).display());
     }
+    // What the shards say of themselves is read before anything is written.
+    for range in &there {
+        opened(study, range, &study.shard(range))?;
+    }
     let gathered = write_in_pieces(to, |file| merged(study, &there, BufWriter::new(file), any_build))?;
     Ok(Gathered { file: to.to_path_buf(), ..gathered })
 }
@@ -176,7 +180,13 @@ fn merged(
 
 /// A shard whose metadata fit the study.
 fn opened(study: &Study, range: &Range<u64>, path: &Path) -> miette::Result<Reader> {
-    let reader = Reader::open(study.kind, path)?;
+    let reader = Reader::open(study.kind, path).map_err(|damaged| {
+        miette::miette!(
+            help = "`muprime submit` with the same folder sets it aside and runs its cases again",
+            "{}: no whole shard: {damaged:#}",
+            path.display()
+        )
+    })?;
     let fits = |name: &str, wanted: &str| {
         let found = reader.facts.get(name).map_or("nothing", String::as_str);
         if found == wanted {

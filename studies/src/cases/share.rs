@@ -91,9 +91,10 @@ impl Share {
     /// What of its part has no result yet, in ranges of which each becomes a shard.
     ///
     /// # Errors
-    /// A folder that cannot be read.
+    /// A folder that cannot be read; a shard of other cases.
     pub fn missing(&self, study: &Study) -> miette::Result<Vec<Range<u64>>> {
         let part = self.part(study.file.header.cases);
+        super::worker::set_damaged_aside(study, &part)?;
         let within = |hole: Range<u64>| hole.start.max(part.start)..hole.end.min(part.end);
         let holes = holes(&study.ranges_there()?, study.file.header.cases).into_iter().map(within);
         Ok(holes.filter(|hole| !hole.is_empty()).flat_map(|hole| pieces(&hole, MOST)).collect())

@@ -110,6 +110,15 @@ impl Study {
             .into_diagnostic()
             .wrap_err_with(|| format!("{}: no study: {} cannot be read", out.display(), place.display()))?;
         let manifest = Manifest::of(&bytes, &place)?;
+        if cases.is_none() && !manifest.cases.exists() {
+            let help = "--cases FILE says where it is now";
+            miette::bail!(
+                help = help,
+                "{}: its file of cases, {}, is gone",
+                out.display(),
+                manifest.cases.display()
+            );
+        }
         let study = Study::of(cases.unwrap_or(&manifest.cases), out.canonicalize().into_diagnostic()?)?;
         study.same(&manifest)?;
         Ok(study)
@@ -134,14 +143,9 @@ impl Study {
         self.out.join("shards")
     }
 
-    /// Where the shard of a range is: in one of at most `FOLDERS` folders, or beside them, where earlier
-    /// versions wrote it.
+    /// Where the shard of a range is: in one of at most `FOLDERS` folders.
     pub fn shard(&self, range: &Range<u64>) -> PathBuf {
         let name = format!("{:012}-{:012}.parquet", range.start, range.end);
-        let beside = self.shards().join(&name);
-        if beside.exists() {
-            return beside;
-        }
         let cases_a_folder = self.file.header.cases.div_ceil(FOLDERS).max(SHARDS);
         self.shards().join(format!("{:04}", range.start / cases_a_folder)).join(name)
     }
@@ -153,11 +157,7 @@ impl Study {
     pub fn ranges_there(&self) -> miette::Result<Vec<Range<u64>>> {
         let mut there = Vec::new();
         for folder in names(&self.shards())? {
-            if folder.ends_with(".parquet") {
-                there.extend(range_of(&folder));
-            } else {
-                there.extend(names(&self.shards().join(folder))?.iter().filter_map(|name| range_of(name)));
-            }
+            there.extend(names(&self.shards().join(folder))?.iter().filter_map(|name| range_of(name)));
         }
         there.sort_by_key(|r: &Range<u64>| (r.start, std::cmp::Reverse(r.end)));
         Ok(there)

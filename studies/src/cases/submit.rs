@@ -9,7 +9,7 @@ use super::plan::{self, Pilot, Plan, length};
 use super::run::Entry;
 use super::shard::Reader;
 use super::study::Study;
-use super::worker::{Done, work};
+use super::worker::{Done, set_damaged_aside, work};
 use crate::progress;
 use indicatif::ProgressBar;
 use miette::{Context, IntoDiagnostic};
@@ -139,6 +139,7 @@ pub fn submit(study: &Study, options: &Options) -> miette::Result<Submitted> {
     let begun = Instant::now();
     let engine = checked(options)?;
     let cases = study.file.header.cases;
+    set_damaged_aside(study, &(0..cases))?;
     let missing = || Ok::<_, miette::Report>(holes(&study.ranges_there()?, cases));
     let first = length(&missing()?);
     let bar = progress::bar(cases, "cases");
@@ -298,6 +299,7 @@ fn cut(holes: &[Range<u64>], pilot: &Pilot, options: &Options) -> Plan {
 /// A case that cannot be made, a folder that cannot be read.
 pub fn tasks(study: &Study, options: &Options) -> miette::Result<Value> {
     let cases = study.file.header.cases;
+    set_damaged_aside(study, &(0..cases))?;
     let (holes, command) = (holes(&study.ranges_there()?, cases), command(study)?);
     let pilot = if holes.is_empty() { None } else { Some(pilot(study, &holes, options)?) };
     let task = |pilot: &Pilot, range: &Range<u64>, limit_s: f64| {

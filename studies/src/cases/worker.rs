@@ -67,6 +67,17 @@ pub fn work(study: &Study, range: Range<u64>, program: &str, job: Option<&Path>)
     Ok(Done::Made { failed })
 }
 
+/// Sets the shards within a range that cannot be read aside: their cases have no result.
+///
+/// # Errors
+/// A shard of other cases than the file's: a file that a case names was changed since.
+pub fn set_damaged_aside(study: &Study, within: &Range<u64>) -> miette::Result<()> {
+    for range in study.ranges_there()?.iter().filter(|r| r.start < within.end && within.start < r.end) {
+        stands(study, range, &study.shard(range))?;
+    }
+    Ok(())
+}
+
 /// Whether the shard at a range's place is that of its cases. One that cannot be read is set aside, with a word.
 fn stands(study: &Study, range: &Range<u64>, place: &Path) -> miette::Result<bool> {
     let reader = Reader::open(study.kind, place).ok();
