@@ -137,6 +137,7 @@ const WRONG: &[Wrong] = &[
     ("setup.toml", "window = 50", "window = 0", "window"),
     ("setup.toml", "normal_force_min_n = 0.02", "normal_force_min_n = -0.02", "normal_force_min_n"),
     ("setup.toml", "sample_sd_n = 0.002", "sample_sd_n = 0", "sample_sd_n"),
+    ("setup.toml", "sample_sd_n = 0.002", "sample_sd_n = 21.1", "multiply them by the gain"),
     ("setup.toml", "artificial-silicone", "no-tip", "no-tip"),
     ("setup.toml", "[limits]", "[limits]\nspeed_max_m_s = 250", "mm/s meant?"),
     ("setup.toml", "[limits]", "[limits]\nfrozen_after = 1", "frozen_after"),

@@ -37,14 +37,18 @@ class VirtualRig:
             path = Path(self._folder.name) / "defects.toml"
             path.write_text(defects, encoding="utf-8")
             command += ["--defects", str(path)]
-        self._process = subprocess.Popen(command, stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True)
+        # Into a file: nobody reads while the rig serves, and a full pipe would stop it.
+        errors = Path(self._folder.name) / "errors.txt"
+        with errors.open("wb") as to:
+            self._process = subprocess.Popen(command, stdout=subprocess.PIPE, stderr=to, text=True)
         assert self._process.stdout is not None
         told = self._process.stdout.readline()
         said = json.loads(told) if told else {}
         if "modbus_tcp" not in said:
-            _, errors = self._process.communicate()
+            self._process.communicate()
+            why = errors.read_text(encoding="utf-8", errors="replace").strip()
             self._folder.cleanup()
-            raise ValueError(said.get("error") or errors.strip() or "the virtual rig did not start")
+            raise ValueError(said.get("error") or why or "the virtual rig did not start")
         host, _, port = said["modbus_tcp"].rpartition(":")
         self.modbus_tcp = (host, int(port))
 
@@ -57,9 +61,8 @@ class VirtualRig:
             except subprocess.TimeoutExpired:
                 self._process.kill()
                 self._process.wait()
-        for pipe in (self._process.stdout, self._process.stderr):
-            if pipe is not None:
-                pipe.close()
+        if self._process.stdout is not None:
+            self._process.stdout.close()
         self._folder.cleanup()
 
     def __enter__(self) -> VirtualRig:

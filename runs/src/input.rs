@@ -123,23 +123,27 @@ impl<'a> Problems<'a> {
     }
 }
 
+/// Endings of names with their units, as symbols and as OpenMetrics spells them; the longer ones first.
+pub const UNITS: [(&str, &str, &str); 14] = [
+    ("_n_per_m", "N/m", "newtons_per_meter"),
+    ("_m_per_s", "m/s", "meters_per_second"),
+    ("_per_s", "1/s", "per_second"),
+    ("_n_s", "N/s", "newtons_per_second"),
+    ("_m_s", "m/s", "meters_per_second"),
+    ("_deg", "deg", "degrees"),
+    ("_hz", "Hz", "hertz"),
+    ("_pa", "Pa", "pascals"),
+    ("_m", "m", "meters"),
+    ("_n", "N", "newtons"),
+    ("_s", "s", "seconds"),
+    ("_c", "deg C", "celsius"),
+    ("_pct", "%", "percent"),
+    ("_au", "a.u.", "arbitrary_units"),
+];
+
 /// The unit that a key's name ends with.
 pub fn unit_of(key: &str) -> &'static str {
-    const UNITS: [(&str, &str); 12] = [
-        ("_n_per_m", "N/m"),
-        ("_m_per_s", "m/s"),
-        ("_n_s", "N/s"),
-        ("_m_s", "m/s"),
-        ("_hz", "Hz"),
-        ("_pa", "Pa"),
-        ("_m", "m"),
-        ("_n", "N"),
-        ("_s", "s"),
-        ("_c", "deg C"),
-        ("_pct", "%"),
-        ("_au", "a.u."),
-    ];
-    UNITS.iter().find(|(ending, _)| key.ends_with(ending)).map_or("", |(_, unit)| unit)
+    UNITS.iter().find(|(ending, ..)| key.ends_with(ending)).map_or("", |(_, unit, _)| unit)
 }
 
 /// The unit that was meant, where a value is a thousand or a million times off what is allowed: '27.5 Hz: kHz meant? ...'.

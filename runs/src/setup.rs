@@ -45,6 +45,8 @@ pub const THERMOMETER: &str =
 
 /// CPUs that a set of Linux may name (`CPU_SETSIZE`).
 const MOST_CPUS: usize = 1024;
+/// Largest scatter of a sample in N: the noise of a channel in counts stands above it.
+const SAMPLE_SD_MAX_N: f64 = 1.0;
 
 /// A setup file.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize, schemars::JsonSchema)]
@@ -149,6 +151,14 @@ impl SetupFile {
                 let problem = format!("{name} = {value}: a finite number above zero is needed");
                 wrong.add(&[table, name], problem, None);
             }
+        }
+        let sample_sd_n = self.estimate.sample_sd_n;
+        if sample_sd_n > SAMPLE_SD_MAX_N {
+            let problem =
+                format!("sample_sd_n = {sample_sd_n} N: a sample scatters by at most {SAMPLE_SD_MAX_N} N");
+            let remedy =
+                "`calibrate noise` gives counts: multiply them by the gain in N per count".to_string();
+            wrong.add(&["estimate", "sample_sd_n"], problem, remedy);
         }
     }
 }

@@ -9,6 +9,7 @@ use diagnosis::hypotheses::Options;
 use diagnosis::law::{BaseLaw, CannotTell};
 use diagnosis::verdict::{Diagnosis, diagnose};
 use miette::{IntoDiagnostic, WrapErr};
+use models::law::BuiltIn;
 use models::pass::Pass;
 use models::rig_file::RigFile;
 use runs::edges::add_record;
@@ -78,6 +79,7 @@ impl Subject {
         let options = Options { law: self.law.clone(), ..options };
         let mut result = diagnose(&self.table, &self.rig, &options, self.sha256.clone());
         run.map_or(Ok(()), |run| add_record(&mut result, run, &self.rig))?;
+        result.report.remarks.extend(run.filter(|_| self.law.is_none()).and_then(another_law));
         let lack = points(&self.passes, |p| p.lateral_force_n.is_none());
         let unused = |(count, points)| {
             let all = self.passes.len();
@@ -106,6 +108,15 @@ impl Subject {
         let named = vec![("table", table.to_string()), ("rig", rig.to_string())];
         page(result, &self.table, &[named, about::of_rig(&self.rig)].concat())
     }
+}
+
+/// A word on a run that was compared with another law than the verdict's, the spring-slider.
+fn another_law(run: &Path) -> Option<String> {
+    let facts = record_facts(run).ok()?;
+    let law = facts.get("model").filter(|law| *law != BuiltIn::SpringSlider.name())?;
+    Some(format!(
+        "The run was compared with the law '{law}', and this verdict is of the spring-slider: give the run's law with --model."
+    ))
 }
 
 /// Diagnoses a run that is over and writes what comes of it into its folder.

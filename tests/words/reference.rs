@@ -1,6 +1,7 @@
 //! `docs/reference.md`: every key of every kind of file, from the schemas.
 
 use serde_json::Value;
+use sim::defects::Draw;
 use std::fmt::Write;
 use tables::import::targets::{ColumnKind as Cell, TARGETS};
 use tables::schemas::schema::Kind;
@@ -156,7 +157,15 @@ fn defects() -> String {
          | name | where | parameters, with the range of a seed | what it is |\n|---|---|---|---|\n",
     );
     for kind in sim::defects::ALL {
-        let parameter = |p: &sim::defects::Parameter| format!("`{}` {} to {}", p.name, p.low, p.high);
+        let parameter = |p: &sim::defects::Parameter| {
+            let (low, high) = (p.low, p.high);
+            let range = match p.draw {
+                Draw::Signed => format!("{low} to {high}, or the negative"),
+                Draw::Factor => format!("{} to {}, or its inverse", 1.0 + low, 1.0 + high),
+                Draw::Linear | Draw::Log => format!("{low} to {high}"),
+            };
+            format!("`{}` {range}", p.name)
+        };
         let parameters: Vec<String> = kind.parameters.iter().map(parameter).collect();
         let place = format!("{:?}", kind.place).to_lowercase();
         let about = one_line(kind.summary);

@@ -168,7 +168,7 @@ fn measure(job: Job, planned: usize, args: &Args, signals: &Signals, json: bool)
     print::draw("", move || bar.finish_and_clear());
     drop(watch);
     if let Ok(summary) = &summary {
-        tell(summary, &continued, json);
+        tell(summary, &continued, args.model.as_deref(), json);
     }
     feed.end(live::Ended::of(&summary));
     followers.end(&summary, args.publish.as_ref());
@@ -378,7 +378,7 @@ fn progress_bar(json: bool, planned: u64) -> ProgressBar {
 }
 
 /// Says what came of a run, which may continue others, and what to do next.
-fn tell(summary: &Summary, continued: &[PathBuf], json: bool) {
+fn tell(summary: &Summary, continued: &[PathBuf], law: Option<&Path>, json: bool) {
     let remarked = runs::run_data::remarks::Remarked::of(summary);
     if json {
         answer_json(&json!({ "summary": remarked }));
@@ -453,7 +453,8 @@ fn tell(summary: &Summary, continued: &[PathBuf], json: bool) {
     let before: Vec<_> = continued.iter().filter(has_passes).filter(|run| **run != summary.folder).collect();
     if summary.model_departed || !before.is_empty() {
         let all = before.into_iter().chain([&summary.folder]).map(|run| quoted(run.display()).to_string());
-        report!("next: muprime diagnose {}", all.collect::<Vec<_>>().join(" "));
+        let law = law.map_or_else(String::new, |law| format!(" --model {}", quoted(law.display())));
+        report!("next: muprime diagnose {}{law}", all.collect::<Vec<_>>().join(" "));
     }
     report!("report: {}", page.display());
 }
