@@ -5,6 +5,11 @@ use realtime::turn::Row;
 use std::collections::BTreeMap;
 use std::io::Cursor;
 
+/// Whether a record is intact and holds everything that its session wrote.
+pub fn complete(found: &Integrity) -> bool {
+    found.intact() && found.missing.is_empty() && found.recovered.is_none()
+}
+
 /// What could be read of a record.
 #[derive(Clone, Debug, Default)]
 pub struct Contents {

@@ -151,7 +151,7 @@ fn a_drift_is_named_when_the_run_was_stopped_and_taken_up_again() {
         );
         for session in 1..=stop_after.len() + 1 {
             let record = std::fs::read(out.join(format!("run-{session}.mcap"))).unwrap();
-            assert!(tests::contents::read(&record).integrity.complete());
+            assert!(tests::contents::complete(&tests::contents::read(&record).integrity));
         }
         let replayed = muprime().arg("replay").arg(&out).output().unwrap();
         assert_eq!(replayed.status.code(), Some(0), "{}", texts(&replayed).0);

@@ -55,8 +55,6 @@ pub struct Speed {
     pub baud: u32,
     /// Its format, such as `8N1`.
     pub format: String,
-    /// Bits per second of a CAN bus behind a serial adapter.
-    pub bitrate: u32,
 }
 
 /// Why a look failed, with what to look at.

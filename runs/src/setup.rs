@@ -150,15 +150,11 @@ impl SetupFile {
             if !(value.is_finite() && value > 0.0) {
                 let problem = format!("{name} = {value}: a finite number above zero is needed");
                 wrong.add(&[table, name], problem, None);
+            } else if name == "sample_sd_n" && value > SAMPLE_SD_MAX_N {
+                let problem = format!("{name} = {value} N: a sample scatters by at most {SAMPLE_SD_MAX_N} N");
+                let remedy = "`calibrate noise` gives counts: multiply them by the gain in N per count";
+                wrong.add(&[table, name], problem, remedy.to_string());
             }
-        }
-        let sample_sd_n = self.estimate.sample_sd_n;
-        if sample_sd_n > SAMPLE_SD_MAX_N {
-            let problem =
-                format!("sample_sd_n = {sample_sd_n} N: a sample scatters by at most {SAMPLE_SD_MAX_N} N");
-            let remedy =
-                "`calibrate noise` gives counts: multiply them by the gain in N per count".to_string();
-            wrong.add(&["estimate", "sample_sd_n"], problem, remedy);
         }
     }
 }

@@ -114,9 +114,7 @@ impl Subject {
 fn another_law(run: &Path) -> Option<String> {
     let facts = record_facts(run).ok()?;
     let law = facts.get("model").filter(|law| *law != BuiltIn::SpringSlider.name())?;
-    Some(format!(
-        "The run was compared with the law '{law}', and this verdict is of the spring-slider: give the run's law with --model."
-    ))
+    Some(format!("This verdict is of the spring-slider; the run was compared with '{law}' (--model)."))
 }
 
 /// Diagnoses a run that is over and writes what comes of it into its folder.

@@ -98,7 +98,7 @@ fn judge(root: &Path, acknowledged: &BTreeSet<u64>, ended: bool) -> Result<(), S
     if ended {
         let record = std::fs::read(run.join("run-1.mcap")).map_err(|e| format!("the record: {e}"))?;
         let found = tests::contents::read(&record).integrity;
-        if !found.complete() {
+        if !tests::contents::complete(&found) {
             return Err(format!("the record: {:?}", found.sentences()));
         }
         let summary = std::fs::read(run.join("summary.json")).map_err(|e| format!("the summary: {e}"))?;

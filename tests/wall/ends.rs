@@ -191,7 +191,7 @@ fn a_sweep_whose_standard_error_is_gone_is_stopped_and_kept_whole() {
             assert_eq!((status, &summary["outcome"]), (Some(1), &"stopped".into()));
             assert_eq!((&summary["off"]["read_back"], &summary["record_lost"]), (&true.into(), &0.into()));
             let record = tests::contents::read(&std::fs::read(run.out.join("run-1.mcap")).unwrap());
-            assert!(record.integrity.complete(), "{:?}", record.integrity);
+            assert!(tests::contents::complete(&record.integrity), "{:?}", record.integrity);
             let last = record.rows().last().unwrap();
             assert!(!last.armed && last.drive_pp_m == 0.0);
             None

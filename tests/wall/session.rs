@@ -72,7 +72,7 @@ fn a_sweep_over_real_modbus_tcp_ends_with_table_record_and_report() {
         assert_eq!(counted, of_loop("cycles") + of_loop("overruns"), "the histogram holds every deadline");
         // The record says the same, with setup, plan and the loop's report inside.
         let record = tests::contents::read(&std::fs::read(out.join("run-1.mcap")).unwrap());
-        assert!(record.integrity.complete(), "{:?}", record.integrity);
+        assert!(tests::contents::complete(&record.integrity), "{:?}", record.integrity);
         assert_eq!(
             record.rows().count() as u64 + summary["record_lost"].as_u64().unwrap(),
             of_loop("cycles")
@@ -173,7 +173,11 @@ fn an_interrupt_stops_safely_and_keeps_what_was_measured() {
         assert_eq!(rest.last().unwrap()["summary"]["outcome"], "stopped");
         assert!(!points(&out).is_empty());
         let record = tests::contents::read(&std::fs::read(out.join("run-1.mcap")).unwrap());
-        assert!(record.integrity.complete(), "the record was ended properly: {:?}", record.integrity);
+        assert!(
+            tests::contents::complete(&record.integrity),
+            "the record was ended properly: {:?}",
+            record.integrity
+        );
         let last = record.rows().last().unwrap();
         assert!(!last.armed && last.drive_pp_m == 0.0 && last.load_n == 0.0 && last.velocity_m_s == 0.0);
     });

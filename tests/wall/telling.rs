@@ -118,7 +118,7 @@ fn is_whole(out: &Path, what: &str) {
     assert_eq!(summary["off"]["read_back"], true, "{what}");
     assert_eq!(summary["planned"].as_u64(), Some(passes.len() as u64), "{what}");
     let record = tests::contents::read(&std::fs::read(out.join("run-1.mcap")).unwrap());
-    assert!(record.integrity.complete(), "{what}: {:?}", record.integrity);
+    assert!(tests::contents::complete(&record.integrity), "{what}: {:?}", record.integrity);
     assert_eq!(record.passes().count(), passes.len(), "{what}: passes made and kept");
     assert!(out.join("report.html").exists(), "{what}");
 }

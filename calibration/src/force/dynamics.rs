@@ -33,9 +33,8 @@ fn refuse_clipped(samples: &[f64], both: bool) -> Result<(), FitError> {
     repeated.first().filter(|_| clipped).map_or(Ok(()), |end| Err(FitError::Clipped { end: *end }))
 }
 
-/// Fits a low-pass with dead time to each of several records around a step at `step_at_s`: times in s and samples. It is
-/// of second order, or of first where Akaike's criterion finds that to describe all of them no worse: a first-order
-/// channel has the natural frequency and the damping of any strongly damped one.
+/// Fits a low-pass with dead time to records (times in s, samples) around a step at `step_at_s`: of second order, or of first
+/// where Akaike's criterion finds all of them described no worse. That has no natural frequency, and no damping, of its own.
 ///
 /// # Errors
 /// Too few or clipped samples, no step in them, or no convergence; with the number of the record, from 0.

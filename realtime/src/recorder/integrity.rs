@@ -55,11 +55,6 @@ impl Integrity {
         self.cut.is_none() && self.damaged_places == 0 && self.somewhere.is_none()
     }
 
-    /// Whether the file is intact and holds everything that its session wrote.
-    pub fn complete(&self) -> bool {
-        self.intact() && self.missing.is_empty() && self.recovered.is_none()
-    }
-
     /// Messages of a topic that are known to be missing.
     pub fn missing(&self, topic: &str) -> u64 {
         self.missing.get(topic).copied().unwrap_or(0)

@@ -2,11 +2,12 @@
 
 use super::integrity::Integrity;
 use super::{RECOVERED, TOPICS, TRAILER, WRITTEN};
+use binrw::BinRead;
 use chunk::Message;
-use mcap::records::op;
+use mcap::records::{ChunkHeader, op};
 use sound::{Sound, known, may_begin, sound};
 use std::collections::{BTreeMap, VecDeque};
-use std::io::{Read, Seek, SeekFrom};
+use std::io::{Cursor, Read, Seek, SeekFrom};
 
 mod chunk;
 mod sound;
@@ -140,14 +141,11 @@ impl<R: Read + Seek> Reader<R> {
         self.window = window;
     }
 
-    /// Whether the record that was read is a chunk outside of the window: its first and last log times are
-    /// its first words.
+    /// Whether the record that was read is a chunk outside of the window.
     fn is_outside(&self, opcode: u8) -> bool {
-        let time = |at: usize| self.body.get(at..)?.first_chunk::<8>().map(|b| u64::from_le_bytes(*b));
-        opcode == op::CHUNK
-            && time(0)
-                .zip(time(8))
-                .is_some_and(|(first, last)| last < self.window[0] || first > self.window[1])
+        let [from, to] = self.window;
+        let outside = |head: ChunkHeader| head.message_end_time < from || head.message_start_time > to;
+        opcode == op::CHUNK && ChunkHeader::read_le(&mut Cursor::new(&self.body)).is_ok_and(outside)
     }
 
     /// Checks the messages and gives none out.

@@ -6,28 +6,28 @@ use realtime::ports::{Channel, ForceSensor, Forces, Nanos};
 use sim::wire::device::{Device, UnknownQuantity};
 
 /// A virtual sensor whose samples have the counts of the setup's instruments.
-pub struct AsSent<S> {
-    inner: S,
+pub struct AsSent {
+    inner: Box<dyn ForceSensor>,
     /// What sends the lateral and the normal force, and what it knows of its scale.
     axes: [Option<(Profile, SignalId, Values)>; 2],
 }
 
-impl<S> AsSent<S> {
+impl AsSent {
     /// The instruments of force of a setup, around a virtual sensor.
     ///
     /// # Errors
     /// A profile that names what the virtual world does not have.
-    pub fn new(inner: S, setup: &SetupFile) -> Result<Self, UnknownQuantity> {
+    pub fn new(inner: Box<dyn ForceSensor>, setup: &SetupFile) -> Result<Self, UnknownQuantity> {
         let mut axes = [None, None];
         for axis in setup.axes() {
-            let constants = Device::new(axis.profile.clone())?.constants().clone();
+            let constants = Device::new(axis.profile.clone())?.constants;
             axes[usize::from(axis.name == "normal")] = Some((axis.profile, axis.signal, constants));
         }
         Ok(Self { inner, axes })
     }
 }
 
-impl<S: ForceSensor> ForceSensor for AsSent<S> {
+impl ForceSensor for AsSent {
     fn read(&mut self, now: Nanos) -> Forces {
         let mut forces = self.inner.read(now);
         let channels: [&mut Channel; 2] = [&mut forces.lateral, &mut forces.normal];
@@ -61,7 +61,7 @@ mod tests {
     #[test]
     fn counts_are_those_of_the_setups_instrument() {
         let setup: crate::setup::Setup = crate::setup::Setup::load("virtual-ideal").unwrap();
-        let mut port = AsSent::new(Constant(0.25), &setup.file).unwrap();
+        let mut port = AsSent::new(Box::new(Constant(0.25)), &setup.file).unwrap();
         let read = port.read(Nanos(1_000_000));
         let (lateral, normal) = (read.lateral.unwrap(), read.normal.unwrap());
         // drivers/profiles/docs/muprime-force2.md: 0.01 mN a count.

@@ -65,12 +65,10 @@ pub fn run(
 
 /// What the loop of a job has to do with: the virtual rig, through the setup's certificates.
 fn ports_of(job: &Job, [force, amplifier, stage]: [SharedRig; 3]) -> miette::Result<Ports> {
-    let force: Box<dyn ForceSensor> = match &job.setup.certificates.force {
-        None => Box::new(force),
-        Some(_) => {
-            Box::new(AsSent::new(force, &job.setup.file).map_err(|problem| miette::miette!("{problem}"))?)
-        }
-    };
+    let mut force: Box<dyn ForceSensor> = Box::new(force);
+    if job.setup.certificates.force.is_some() {
+        force = Box::new(AsSent::new(force, &job.setup.file).into_diagnostic()?);
+    }
     let ports = Ports::new(force, Box::new(amplifier), Box::new(stage.clone()));
     let mut ports = job.setup.certificates.applied(ports);
     if job.setup.file.supply_relay.is_some() {

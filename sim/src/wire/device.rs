@@ -46,7 +46,7 @@ pub struct Device {
     commands: Vec<Option<(Command, f64)>>,
     blocks: Vec<Vec<u8>>,
     /// What frames of constants say, such as a calibration: known to the instrument itself.
-    constants: Values,
+    pub constants: Values,
     reads: u32,
 }
 
@@ -110,11 +110,6 @@ impl Device {
     /// The profile.
     pub fn profile(&self) -> &Profile {
         &self.profile
-    }
-
-    /// What its frames of constants say, such as a calibration.
-    pub fn constants(&self) -> &Values {
-        &self.constants
     }
 
     /// The bytes of one frame, all of one moment of the world.

@@ -94,12 +94,9 @@ pub fn outcome_of(args: &Args, sources: &mut Sources) -> miette::Result<Outcome>
             Finding::new(format!("{name}.white_density"), "counts^2/Hz", [level, level / n.sqrt()], n),
         ]);
         for line in spectrum.lines(6.0) {
-            remarks.push(format!(
-                "{name}: a line at {:.2} Hz, within {:.2} Hz, of {:.3} counts rms",
-                line.frequency_hz,
-                0.5 * spectrum.resolution_hz,
-                line.rms
-            ));
+            let (hz, within, rms) = (line.frequency_hz, 0.5 * spectrum.resolution_hz, line.rms);
+            remarks
+                .push(format!("{name}: a line at {hz:.2} Hz, within {within:.2} Hz, of {rms:.3} counts rms"));
         }
         match quantum(&whole) {
             None => miette::bail!("{shown}: {name}_counts are all equal: this channel is dead or frozen"),

@@ -3,7 +3,7 @@
 use super::grid::{Cell, Grid};
 use super::targets::Id;
 use super::values::Values;
-use calibration::certificate::date;
+use chrono::{Datelike, NaiveDate};
 
 /// A day, by which workbooks count time, in s.
 pub const DAY_S: f64 = 86_400.0;
@@ -79,23 +79,11 @@ fn written(cell: &Cell, month_first: Option<bool>) -> Option<Reading> {
 /// Days of a date from 1970: `2024-03-01`, `01.03.2024`, `01-Mar-2024`; of one with slashes if it is
 /// known whether it begins with the month.
 fn days(date: &str, month_first: Option<bool>) -> Option<f64> {
-    const MONTHS: [&str; 12] =
-        ["jan", "feb", "mar", "apr", "may", "jun", "jul", "aug", "sep", "oct", "nov", "dec"];
-    let mark = date.chars().find(|c| ".-/".contains(*c))?;
-    let parts: Vec<&str> = date.split(mark).collect();
-    let &[first, second, third] = &parts[..] else { return None };
-    let named = MONTHS.iter().position(|m| second.eq_ignore_ascii_case(m)).map(|k| k + 1);
+    let slashes = month_first.map(|month_first| if month_first { "%m/%d/%Y" } else { "%d/%m/%Y" });
+    let mut forms = ["%Y-%m-%d", "%Y/%m/%d", "%d.%m.%Y", "%d-%b-%Y"].into_iter().chain(slashes);
+    let day = forms.find_map(|form| NaiveDate::parse_from_str(date, form).ok())?;
     // A year of two digits might be a day.
-    let (y, m, d) = match (mark, first.len(), third.len()) {
-        ('-' | '/', 4, _) => (first, second, third),
-        ('.', _, 4) => (third, second, first),
-        ('-', _, 4) if named.is_some() => (third, second, first),
-        ('/', _, 4) if month_first? => (third, first, second),
-        ('/', _, 4) => (third, second, first),
-        _ => return None,
-    };
-    let (y, m, d) = (y.parse::<usize>().ok()?, named.or_else(|| m.parse().ok())?, d.parse::<usize>().ok()?);
-    Some(date::parse(&format!("{y:04}-{m:02}-{d:02}"))? as f64 / DAY_S)
+    Some((day - NaiveDate::default()).num_days() as f64).filter(|_| (1000..=9999).contains(&day.year()))
 }
 
 /// The dates beside times of a day, row by row, and the column that has them.

@@ -3,7 +3,7 @@
 use super::grid::{Grid, Row};
 use super::head::Source;
 use delimiter::Delimiter;
-use miette::IntoDiagnostic;
+use encoding_rs::{Encoding, UTF_8, UTF_16LE};
 use std::borrow::Cow;
 
 mod decimal;
@@ -64,23 +64,17 @@ fn whole_lines(text: &str) -> Vec<(u64, Cow<'_, str>)> {
 
 /// The text and its encoding: by byte-order mark, UTF-8 where it is that, else Latin-1, in which any byte is a letter.
 fn decoded(bytes: &[u8]) -> miette::Result<(String, &'static str)> {
-    let wide = |rest: &[u8], read: fn([u8; 2]) -> u16| {
-        let units: Vec<u16> = rest.chunks_exact(2).map(|p| read([p[0], p[1]])).collect();
-        String::from_utf16(&units).into_diagnostic().map(|text| (text, "UTF-16"))
-    };
-    match bytes {
-        [0xff, 0xfe, rest @ ..] => wide(rest, u16::from_le_bytes),
-        [0xfe, 0xff, rest @ ..] => wide(rest, u16::from_be_bytes),
-        [1..=255, 0, 1..=255, 0, ..] => wide(bytes, u16::from_le_bytes),
-        [0xef, 0xbb, 0xbf, rest @ ..] => Ok((String::from_utf8(rest.to_vec()).into_diagnostic()?, "UTF-8")),
+    let unmarked = if matches!(bytes, [1..=255, 0, 1..=255, 0, ..]) { UTF_16LE } else { UTF_8 };
+    let (encoding, mark) = Encoding::for_bom(bytes).unwrap_or((unmarked, 0));
+    match encoding.decode_without_bom_handling_and_without_replacement(&bytes[mark..]) {
+        Some(text) if encoding != UTF_8 => Ok((text.into_owned(), "UTF-16")),
+        None if mark > 0 || encoding != UTF_8 => miette::bail!("its {} is damaged", encoding.name()),
         _ if bytes.contains(&0) => miette::bail!(
             help = "known formats: delimited text, Excel, OpenDocument, Parquet, Arrow, NumPy (.npy), MAT (5 and 7.3), HDF5; export others as CSV",
             "this is neither text nor a binary format that is known"
         ),
-        _ => Ok(match std::str::from_utf8(bytes) {
-            Ok(text) => (text.to_string(), "UTF-8"),
-            Err(_) => (bytes.iter().map(|b| char::from(*b)).collect(), "Latin-1"),
-        }),
+        Some(text) => Ok((text.into_owned(), "UTF-8")),
+        None => Ok((bytes.iter().map(|b| char::from(*b)).collect(), "Latin-1")),
     }
 }
 

@@ -68,7 +68,7 @@ fn range(text: &str) -> Result<(u16, u16), String> {
 /// Shows what is there; fails where nobody answers, or the answer is no good.
 pub fn run(args: &Args, json: bool) -> miette::Result<ExitCode> {
     let place = Place::of(&args.address);
-    let speed = Speed { baud: args.baud, format: args.format.clone(), bitrate: args.bitrate };
+    let speed = Speed { baud: args.baud, format: args.format.clone() };
     let long = args.seconds;
     let failed = |why: peek::PeekError| miette::miette!("{}: {why}", args.address);
     if let Some((first, count)) = args.registers {
