@@ -1,5 +1,5 @@
-//! Helpers that several system tests share: `contents`, `memory`, `near`, `peer`, `served`, `study`, `waiting`. README.md lists
-//! the tests.
+//! Helpers that several system tests share: `contents`, `memory`, `near`, `peer`, `served`, `study`, `waiting`.
+//! README.md lists the tests.
 
 pub mod contents;
 pub mod memory;

@@ -1,4 +1,4 @@
-//! A plan on a world in virtual time, of which nothing is kept but what the caller takes: for statistics.
+//! A plan on a world in virtual time, of which nothing is stored but what the caller takes: for statistics.
 
 use models::prediction::FrictionModel;
 use realtime::compare::Agreement;
@@ -24,8 +24,7 @@ pub struct MemorySweep {
     pub cycles: u64,
 }
 
-/// Runs a plan on a world in virtual time and keeps nothing: for statistics, and to see beforehand what a plan shows.
-/// `each` takes every row.
+/// Runs a plan on a world in virtual time and stores nothing: for statistics. `each` takes every row.
 ///
 /// # Errors
 /// A plan that the limits do not allow, or a world that cannot be.

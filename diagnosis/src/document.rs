@@ -95,8 +95,8 @@ mod tests {
 
     /// `NaN` stood in the cells beyond the table of an effect.
     #[test]
-    fn what_cannot_be_told_is_an_empty_cell() {
-        let told = Forecast {
+    fn what_is_unknown_is_an_empty_cell() {
+        let whole = Forecast {
             baseline: 0.1,
             recalibrated: 0.1,
             corrected: 0.2,
@@ -106,13 +106,13 @@ mod tests {
             in_run: 0.25,
             in_run_sd: 0.02,
         };
-        assert_eq!(cells(&told), "1e-1,2e-1,1e-2,2.5e-1,2e-2");
+        assert_eq!(cells(&whole), "1e-1,2e-1,1e-2,2.5e-1,2e-2");
         // Beyond the table of an effect the law still tells; a deviation of no number is none.
-        let beyond = Forecast { corrected: f64::NAN, in_run: f64::NAN, ..told };
+        let beyond = Forecast { corrected: f64::NAN, in_run: f64::NAN, ..whole };
         assert_eq!(cells(&beyond), "1e-1,,,,");
-        assert_eq!(cells(&Forecast { corrected_sd: f64::NAN, ..told }), "1e-1,2e-1,,2.5e-1,2e-2");
+        assert_eq!(cells(&Forecast { corrected_sd: f64::NAN, ..whole }), "1e-1,2e-1,,2.5e-1,2e-2");
         // A law that cannot tell is the base of all of them.
-        assert_eq!(cells(&Forecast { baseline: f64::NAN, ..told }), ",,,,");
+        assert_eq!(cells(&Forecast { baseline: f64::NAN, ..whole }), ",,,,");
     }
 
     /// Conditions of the table are within it; a speed of ten times the largest is outside.

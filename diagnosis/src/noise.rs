@@ -127,8 +127,8 @@ fn replicates(table: &Table, problem: &Problem, variance: &[f64], scatter: &Scat
         }
     }
     let k = &problem.constants;
-    // Where the replicates exclude the upper bound, were the two that differ most none, the statement is wrong, and they
-    // alone count. Scatter below the statement is believed only as far as they carry it.
+    // Where the replicates exclude the upper bound, without the two that differ most, they alone count.
+    // Scatter below the statement is believed only as far as they carry it.
     let [low, high] = k.variance_factor_bounds;
     let least = quotient(sum - largest, freedom.saturating_sub(1), 1.0 - EXCLUDED);
     let repeated = match least {

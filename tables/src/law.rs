@@ -190,8 +190,8 @@ mod tests {
         let [a, b, same] = [file("a", 0.3), file("b", 0.4), file("c", 0.3)];
         assert_eq!(own_effects(&[a.clone(), same, a.clone()]).unwrap().len(), 1);
         let why = own_effects(&[a.clone(), b.clone()]).unwrap_err();
-        let (said, help) = (why.to_string(), why.help().unwrap().to_string());
-        assert!(said.contains(&a.display().to_string()) && said.contains(&b.display().to_string()), "{said}");
-        assert!(said.contains("'twin'") && help.contains("rename"), "{said} {help}");
+        let (why, help) = (why.to_string(), why.help().unwrap().to_string());
+        assert!(why.contains(&a.display().to_string()) && why.contains(&b.display().to_string()), "{why}");
+        assert!(why.contains("'twin'") && help.contains("rename"), "{why} {help}");
     }
 }

@@ -12,8 +12,8 @@ pub type Estimate = [f64; 2];
 pub struct StepResponse {
     /// Time from the step to the start of the response in s (dead time, latency).
     pub delay_s: Estimate,
-    /// Undamped natural frequency of the second-order low-pass in Hz, and its damping ratio; `None` where one of first
-    /// order describes the steps as well, so that nothing determines the two.
+    /// Undamped natural frequency of the second-order low-pass in Hz, and its damping ratio; `None` where one
+    /// of first order describes the steps as well, so that nothing determines the two.
     pub second_order: Option<[Estimate; 2]>,
     /// Frequency where the amplitude is down by the square root of two, in Hz.
     pub bandwidth_hz: Estimate,
@@ -33,8 +33,8 @@ fn refuse_clipped(samples: &[f64], both: bool) -> Result<(), FitError> {
     repeated.first().filter(|_| clipped).map_or(Ok(()), |end| Err(FitError::Clipped { end: *end }))
 }
 
-/// Fits a low-pass with dead time to records (times in s, samples) around a step at `step_at_s`: of second order, or of first
-/// where Akaike's criterion finds all of them described no worse. That has no natural frequency, and no damping, of its own.
+/// Fits a low-pass with dead time to records (times in s, samples) around a step at `step_at_s`: of second
+/// order, or of first where Akaike's criterion finds all of them described no worse.
 ///
 /// # Errors
 /// Too few or clipped samples, no step in them, or no convergence; with the number of the record, from 0.
@@ -276,8 +276,8 @@ mod tests {
         assert!((bandwidth_ratio(0.5f64.sqrt()) - 1.0).abs() < 1e-12);
     }
 
-    /// A channel of first order had a natural frequency and a damping that nothing determines, and its delay and
-    /// bandwidth lay outside their intervals in more than half of the records.
+    /// It had a natural frequency and a damping that nothing determines, and its delay and bandwidth lay
+    /// outside their intervals in more than half of the records.
     #[test]
     fn a_channel_of_first_order_is_one_and_its_intervals_cover() {
         use rand_distr::Distribution as _;

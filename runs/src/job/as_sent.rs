@@ -1,4 +1,4 @@
-//! Forces in virtual time as the instruments of a setup would send them: a force certificate speaks of their counts.
+//! Forces in virtual time in the counts of a setup's instruments, of which a force certificate speaks.
 
 use crate::setup::SetupFile;
 use instruments::{Profile, SignalId, Values};
@@ -56,8 +56,8 @@ mod tests {
         }
     }
 
-    /// The virtual sensor has 1e-4 N a count, whatever instrument the setup names: a certificate of one with 1e-5 N
-    /// read a tenth in virtual time.
+    /// The virtual sensor has 1e-4 N a count, whatever instrument the setup names: a certificate of one with
+    /// 1e-5 N read a tenth in virtual time.
     #[test]
     fn counts_are_those_of_the_setups_instrument() {
         let setup: crate::setup::Setup = crate::setup::Setup::load("virtual-ideal").unwrap();

@@ -19,7 +19,7 @@ pub struct Args {
 /// Times in s and values of one event.
 type Record = (Vec<f64>, Vec<f64>);
 
-/// One event's answer: names, units and values of what it found, and standard deviation and largest of what the fit left.
+/// Names, units and values of what an event shows, and standard deviation and largest of what the fit left.
 type Event = (Vec<(&'static str, &'static str, Estimate)>, [f64; 2]);
 
 /// Steps of force: a low-pass with dead time, of second order or of first.
