@@ -71,7 +71,7 @@ impl ConditionArgs {
             ("mu0", self.mu0, [0.0, 10.0]),
         ];
         for (key, value, [least, largest]) in own.iter().chain(more).copied() {
-            if !(least..=largest).contains(&value) && !(value < 0.0 && least == 0.0) {
+            if !((least..=largest).contains(&value) || value < 0.0 && least == 0.0) {
                 let meant = unit_meant(key, value, [least.max(1e-6 * largest), largest]);
                 let hint = meant.map_or_else(String::new, |meant| format!(" ({meant})"));
                 let unit = unit_of(key);
