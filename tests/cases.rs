@@ -208,6 +208,7 @@ fn gathering_refuses_holes_contradictions_and_mixed_versions() {
     assert!(again.status.success() && texts(&again).1.contains("set aside"), "{:?}", texts(&again));
     assert_eq!(gathered(&out), wanted);
     // So does the documented way to go on, which read names alone.
+    std::fs::remove_file(&table).unwrap();
     std::fs::write(&whole, &kept[..kept.len() / 2]).unwrap();
     assert!(refused().contains("sets it aside"));
     let plan = said(&["submit", text(&cases), "--out", text(&out), "--plan", "--case-s", "0.001"]);

@@ -579,7 +579,11 @@ fn an_effect_of_ones_own_is_one_more_hypothesis() {
         ("film", "speed_m_s,mu_relative\n0.1,1\n".into(), "an effect table has no column 'mu_relative'"),
         ("film", "speed_m_s\n0.1\n".into(), "'friction_change' is missing"),
         ("film", format!("# size_sd: -1\n{}", dip_table(1e-4, 1.0)), "a number above zero"),
-        ("film", format!("# place: skin\n{}", dip_table(1e-4, 1.0)), "contact, finger, plate or instrument"),
+        (
+            "film",
+            dip_table(1e-4, 1.0).replace("place: contact", "place: skin"),
+            "contact, finger, plate or instrument",
+        ),
     ] {
         std::fs::write(clean.join(format!("{name}.csv")), text).unwrap();
         refused(&clean, &["diagnose", "points.csv", "--effect", &format!("{name}.csv")], &[part]);

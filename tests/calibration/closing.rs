@@ -14,10 +14,15 @@ parameters = { lateral_per_normal = 0.08, normal_per_lateral = 0.01 }
 ";
 
 /// Force of a count of `muprime-force2` (N), as its profile states it: a certificate speaks of these counts.
-const COUNT_N: f64 = 1e-5;
+pub const COUNT_N: f64 = 1e-5;
+
+/// As below, in the virtual sensor's own counts of 0.1 mN.
+pub fn series(defects: &Defects) -> String {
+    series_in_counts(1e-4, defects)
+}
 
 /// A dead-weight series on the virtual rig's own sensor, with the world's defect before it, as CSV.
-pub fn series(defects: &Defects) -> String {
+pub fn series_in_counts(count_n: f64, defects: &Defects) -> String {
     let mut sensor = Sensor::new(SensorConfig { sample_period_s: 0.01, ..SensorConfig::default() }, 0.01, 11);
     let mut direction = Noise::new(11, "pulls");
     let weighing = Weighing::default();
@@ -49,7 +54,7 @@ pub fn series(defects: &Defects) -> String {
             let shown = sensor.feel(forces.lateral_n, forces.normal_n);
             let sample = sensor.sample(shown, realtime::ports::Nanos(tick * 10_000_000));
             if i >= 800 {
-                (0..2).for_each(|a| sum[a] += sample.force_n[a] / COUNT_N / 200.0);
+                (0..2).for_each(|a| sum[a] += (sample.force_n[a] / count_n).round() / 200.0);
             }
         }
         let mass = if axis == "zero" { String::new() } else { mass_kg.to_string() };
@@ -90,7 +95,7 @@ fn a_calibrated_rig_is_no_longer_blamed_and_bad_certificates_are_refused() {
     let at = folder.path();
     let write = |name: &str, text: &str| std::fs::write(at.join(name), text).unwrap();
     write("defects.toml", CROSSTALK);
-    write("series.csv", &series(&Defects::parse(CROSSTALK).unwrap()));
+    write("series.csv", &series_in_counts(COUNT_N, &Defects::parse(CROSSTALK).unwrap()));
 
     let certified =
         muprime(at, "calibrate force series.csv --operator Operator --serial V-1 --out force.toml --json");

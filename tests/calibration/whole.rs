@@ -3,7 +3,7 @@
 
 use crate::amplitude::Bench;
 use crate::bench::seed;
-use crate::closing::{muprime, series, verdict};
+use crate::closing::{COUNT_N, muprime, series_in_counts, verdict};
 use sim::defects::Defects;
 use sim::world::WorldConfig;
 use std::fmt::Write as _;
@@ -73,7 +73,7 @@ fn after_a_whole_calibration_the_instruments_are_gone_from_the_verdict() {
     let at = folder.path();
     let defects = format!("{CROSSTALK}{AMPLITUDE}");
     write(at, "defects.toml", &defects);
-    write(at, "series.csv", &series(&Defects::parse(&defects).unwrap()));
+    write(at, "series.csv", &series_in_counts(COUNT_N, &Defects::parse(&defects).unwrap()));
     write(at, "table.csv", &table(&defects, 1.0));
     certify(at, "force series.csv --serial V-1 --out force.toml");
     certify(at, "amplitude --table table.csv --form bent --serial A-1 --out amplitude.toml");
@@ -133,7 +133,7 @@ fn a_certificate_that_no_longer_holds_is_named() {
     let folder = tempfile::tempdir().unwrap();
     let at = folder.path();
     // Weighed when the sensor was sound; then it was knocked, and its axes talk.
-    write(at, "series.csv", &series(&Defects::none()));
+    write(at, "series.csv", &series_in_counts(COUNT_N, &Defects::none()));
     certify(at, "force series.csv --serial V-1 --out force.toml");
     write(at, "defects.toml", CROSSTALK);
     write(at, "knocked.toml", &setup("\"force.toml\"", ""));
@@ -148,7 +148,7 @@ fn a_certificate_that_no_longer_holds_is_named() {
 fn a_certificate_holds_within_its_temperatures_only() {
     let folder = tempfile::tempdir().unwrap();
     let at = folder.path();
-    let with_temperature: String = series(&Defects::none())
+    let with_temperature: String = series_in_counts(COUNT_N, &Defects::none())
         .lines()
         .enumerate()
         .map(|(i, line)| format!("{line},{}\n", if i == 0 { "temperature_c" } else { "22.0" }))

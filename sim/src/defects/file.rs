@@ -35,10 +35,6 @@ pub enum DefectsError {
     Together { line: usize, one: &'static str, other: &'static str },
     #[error("line {line}: '{parameter}' is {value}; a finite number is needed")]
     NotFinite { line: usize, parameter: String, value: f64 },
-    #[error(
-        "line {line}: '{parameter}' is {value}; it multiplies, and a factor above zero is needed (1 changes nothing)"
-    )]
-    NotAFactor { line: usize, parameter: String, value: f64 },
 }
 
 #[derive(Deserialize)]
@@ -126,9 +122,6 @@ impl Defects {
                 if !value.is_finite() {
                     return Err(DefectsError::NotFinite { line, parameter, value });
                 }
-                if matches!(kind.parameters[index].draw, super::Draw::Factor) && value <= 0.0 {
-                    return Err(DefectsError::NotAFactor { line, parameter, value });
-                }
                 values[index] = value;
                 given[index] = true;
             }
@@ -215,10 +208,6 @@ mod tests {
                 "line 3: 'load_ratio_at_1_n' is NaN",
             ),
             ("[[defect]]\nname = \"squeeze_film\"\nsees = 3\n", "line 3"),
-            (
-                "[[defect]]\nname = \"lateral_gain\"\nparameters = { factor = -0.5 }\n",
-                "line 3: 'factor' is -0.5; it multiplies",
-            ),
             ("[[channel]]\nchannel = \"force\"\nfault = \"tired\"\n", "line 3"),
             (
                 "[[defect]]\nname = \"ridge_inertia\"\nseed = 1\n[[defect]]\nname = \"multi_asperity\"\nseed = 1\n",
