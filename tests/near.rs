@@ -1,4 +1,4 @@
-//! Effects of the library that nearly do the same, so that one stands in for the other where that is missing.
+//! Effects of the library that nearly do the same, so that one is found where the other is missing.
 
 /// Each two of them.
 const NEAR: [(&str, &str); 13] = [

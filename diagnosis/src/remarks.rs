@@ -189,8 +189,8 @@ pub fn of_scatter(fitted: &Fitted, decision: &Decision, with_suspects: Option<&W
     let repeats = fitted.pure.excludes_the_used().filter(|repeats| misstated(*repeats));
     if let Some(repeats) = repeats {
         remarks.push(format!(
-            "Passes under the same conditions scatter {} times as much as rig.toml states; a scatter of {:.2} times the stated \
-             one was used. Correct [noise] in rig.toml, or say which passes are no repeats.",
+            "Passes under the same conditions scatter {} times as much as rig.toml states; a scatter of \
+             {:.2} times the stated one was used. Correct [noise] in rig.toml, or say which passes are no repeats.",
             three_digits(repeats),
             scatter.scale
         ));

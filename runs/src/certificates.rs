@@ -61,8 +61,8 @@ impl Certificates {
             let kind = certificate.kind;
             if !matches!(kind, CertificateKind::Force | CertificateKind::Amplitude) {
                 return Err(fail(format!(
-                    "a {kind} certificate changes nothing in a run. Leave it out, and write its values where they hold: \
-                     in the fingertip, in [noise] of the setup, or in the profile"
+                    "a {kind} certificate changes nothing in a run. Leave it out, and write its values \
+                     where they hold: in the fingertip, in [noise] of the setup, or in the profile"
                 )));
             }
             if seen.contains(&kind) {

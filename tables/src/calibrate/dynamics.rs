@@ -35,9 +35,10 @@ pub fn step(args: &Args, sources: &mut Sources) -> miette::Result<Outcome> {
             all.push(("step.bandwidth", "Hz", step.bandwidth_hz));
             (all, step.residual)
         };
-        let second = "value = base + height step(t - delay) of a second-order low-pass; bandwidth where it is 3 dB down";
-        let first = "value = base + height (1 - exp(-(t - delay) 2 pi bandwidth)): a first-order low-pass, whose natural \
-                     frequency and damping nothing determines";
+        let second = "value = base + height step(t - delay) of a second-order low-pass; \
+                      bandwidth where it is 3 dB down";
+        let first = "value = base + height (1 - exp(-(t - delay) 2 pi bandwidth)): a first-order low-pass, \
+                     whose natural frequency and damping nothing determines";
         let model = if found[0].second_order.is_some() { (second, 5.0) } else { (first, 4.0) };
         Ok((model, found.iter().map(event).collect()))
     })
