@@ -1,6 +1,7 @@
 //! The verdict on scatter that is not what rig.toml states: few, fixed seeds; the full table comes from
 //! `muprime blind --noise all`.
 use diagnosis::Verdict;
+use diagnosis::data::RigFile;
 use diagnosis::hypotheses::Options;
 use diagnosis::verdict::Report;
 use rayon::prelude::*;
@@ -107,5 +108,27 @@ fn what_is_wrong_with_the_scatter_is_said() {
     let gaussian = reports(Roughness::Gaussian);
     for words in ["times as much as", "from run to run", "from pass to pass", "Suspect"] {
         assert!(said(&gaussian, words, &|_| true) <= 1, "{words}");
+    }
+}
+
+/// A noise that rig.toml states a tenth of made a gap of sound passes; one that it states thirty times had no remark.
+#[test]
+fn repeats_deny_a_noise_that_is_misstated() {
+    let stated = |seed: u64, factor: f64| {
+        let mut set = rough(seed, None, Roughness::Gaussian);
+        let mut rig = RigFile::parse(&set.rig_toml).unwrap();
+        rig.noise.pass_relative_sd *= factor;
+        rig.noise.force_sd_n *= factor;
+        set.rig_toml = rig.to_toml().unwrap();
+        report(&set)
+    };
+    for seed in [4_900_001, 4_900_002] {
+        let (small, large) = (stated(seed, 0.1), stated(seed, 30.0));
+        assert_eq!(small.verdict, Verdict::NoGap, "{:?}", small.remarks);
+        assert!((7.0..14.0).contains(&small.scatter.scale), "{}", small.scatter.scale);
+        for report in [small, large] {
+            let remarked = |r: &String| r.contains("times as much as rig.toml states");
+            assert!(report.remarks.iter().any(remarked), "{:?}", report.remarks);
+        }
     }
 }
