@@ -684,3 +684,19 @@ fn the_tables_of_the_trials_can_be_read() {
     let passes: Vec<Pass> = models::pass::read_passes(made.text("run/points.csv").as_bytes()).unwrap();
     assert!(passes.len() >= 12, "{}", passes.len());
 }
+
+/// A sheet with a byte-order mark was refused; a target to render was a law table.
+#[test]
+fn a_mark_before_a_sheet_changes_nothing_and_a_target_is_no_law_table() {
+    let folder = tempfile::tempdir().unwrap();
+    let of = |name: &str| std::fs::read_to_string(tests::file(&format!("drivers/profiles/{name}"))).unwrap();
+    let (profile, sheet) = ("cia402-profile-velocity.toml", "cia402-profile-velocity.eds");
+    std::fs::write(folder.path().join(sheet), format!("\u{feff}{}", of(sheet))).unwrap();
+    std::fs::write(folder.path().join(profile), of(profile)).unwrap();
+    let (code, said) = checked(&[], &folder.path().join(profile));
+    assert_eq!(code, Some(0), "{said}");
+    let (code, said) = checked(&[], &tests::file("examples/plans/render-bumps.csv"));
+    assert_ne!(code, Some(0));
+    let said = said.to_string();
+    assert!(said.contains("a target to render") && said.contains("muprime check PLAN"), "{said}");
+}

@@ -567,10 +567,19 @@ fn an_effect_of_ones_own_is_one_more_hypothesis() {
     let verdict = diagnosed(&clean, &["--effect", "../thick_film.csv"]);
     std::fs::write(clean.join("verdict.json"), verdict.to_string()).unwrap();
     assert!(done(&clean, &["check", "verdict.json"]).is_empty());
-    std::fs::write(clean.join("narrow.csv"), dip_table(0.019, 0.021)).unwrap();
-    let verdict = diagnosed(&clean, &["--effect", "narrow.csv"]);
-    let why = verdict["not_testable"].as_array().unwrap().iter().find(|n| n["effect"] == "narrow").unwrap();
-    assert!(why["because"].as_str().unwrap().contains("does not reach point"), "{why}");
+    let flat = |change: &str| format!("speed_m_s,friction_change\n0.0001,{change}\n1,{change}\n");
+    for (name, text, part) in [
+        ("narrow", dip_table(0.019, 0.021), "does not reach point"),
+        ("flat", flat("0.2"), "it changes friction by 0.200 at every pass, which mu_0 says as well"),
+        ("nothing", flat("0"), "it changes friction by 0.000 at every pass"),
+    ] {
+        std::fs::write(clean.join(format!("{name}.csv")), text).unwrap();
+        let verdict = diagnosed(&clean, &["--effect", &format!("{name}.csv")]);
+        let why = verdict["not_testable"].as_array().unwrap().iter().find(|n| n["effect"] == name).unwrap();
+        assert!(why["because"].as_str().unwrap().contains(part), "{why}");
+        let weighed = verdict["hypotheses"].as_array().unwrap();
+        assert!(weighed.iter().all(|h| !h["effects"].as_array().unwrap().contains(&json!(name))));
+    }
 
     for (name, text, part) in [
         ("squeeze_film", dip_table(1e-4, 1.0), "is an effect of the library"),

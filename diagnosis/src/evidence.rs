@@ -17,8 +17,7 @@ use statrs::function::erf::erfc;
 
 /// Rounds of the search for a mode, at the three shares of form uncertainty.
 const MODE_ROUNDS: [usize; 3] = [4, 6, 3];
-/// Damping of that search: at the start, its factors after a step that helps and one that does not, and its
-/// bounds.
+/// Damping of that search: at the start, factors after a step that helps and one that does not, bounds.
 const DAMPING: f64 = 1e-3;
 const EASED: f64 = 0.1;
 const STIFFENED: f64 = 20.0;

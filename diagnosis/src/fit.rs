@@ -108,7 +108,6 @@ impl Problem {
     }
 
     /// The same problem on a base law, which is read once for each pass.
-    #[must_use]
     pub fn on(self, law: Option<&Arc<BaseLaw>>) -> Self {
         let beside =
             law.map_or_else(Vec::new, |law| self.passes.iter().map(|p| self.beside(law, p)).collect());
@@ -127,7 +126,7 @@ impl Problem {
     /// Whether the base law and the user's own effects can tell at a condition; spring-slider and library always can.
     pub fn tells(&self, pass: &Condition) -> bool {
         let at = Condition { mu0: self.nominal.mu0, ..*pass };
-        let reached = |e: &usize| effects::at(*e).own.is_none_or(|own| own.reaches(&at).is_ok());
+        let reached = |e: &usize| effects::at(*e).own.is_none_or(|own| own.factor(1.0, &at).is_ok());
         self.law.as_ref().is_none_or(|law| law.tells(at.mu0, pass)) && self.own.iter().all(reached)
     }
 

@@ -212,14 +212,23 @@ fn unweighed(candidates: &[Candidate]) -> Vec<[usize; 2]> {
     pairs.filter(|p| !weighed.contains(p.as_slice()) && !one_cause(name(p[0]), name(p[1]))).collect()
 }
 
-/// Why an effect of the user's own is not sought: its table does not reach every pass.
+/// Why an effect of the user's own is not sought: its table ends before a pass, or changes all passes alike.
 fn beyond(problem: &Problem, table: &Table, effect: &Effect) -> Option<String> {
     let own = effect.own?;
     let mu0 = problem.nominal.mu0;
-    let why = |i: usize| own.reaches(&Condition { mu0, ..problem.passes[i] }).err().map(|why| (i, why));
-    let (first, why) = (0..problem.len()).find_map(why)?;
-    let value = if why.value.is_nan() { "not measured".into() } else { format!("{:.4e}", why.value) };
-    Some(format!("its table does not reach point {}, where {} is {value}", table.points[first], why.name))
+    let (mut least, mut most) = (f64::INFINITY, f64::NEG_INFINITY);
+    for (pass, point) in problem.passes.iter().zip(&table.points) {
+        match own.factor(1.0, &Condition { mu0, ..*pass }) {
+            Ok(factor) => (least, most) = (least.min(factor), most.max(factor)),
+            Err(why) => {
+                let (name, known) = (why.name, Some(why.value).filter(|value| !value.is_nan()));
+                let value = known.map_or("not measured".into(), |value| format!("{value:.4e}"));
+                return Some(format!("its table does not reach point {point}, where {name} is {value}"));
+            }
+        }
+    }
+    let alike = most - least < 1e-9;
+    alike.then(|| format!("it changes friction by {:.3} at every pass, which mu_0 says as well", least - 1.0))
 }
 
 /// Why an effect is not sought that only an outside standard shows, where rig.toml states that calibration.

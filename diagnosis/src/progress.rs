@@ -74,4 +74,18 @@ mod tests {
         assert!(stages.len() > 20 && stages.iter().all(|s| (0.0..=1.0).contains(&s.share)), "{stages:?}");
         assert!(stages.iter().any(|s| s.leading.len() > 3), "{stages:?}");
     }
+
+    /// It began the stages anew, and a diagnosis that was stopped then had its leading causes.
+    #[test]
+    fn the_second_opinion_on_suspect_passes_reports_nothing() {
+        let mut table = table(&mut Deviates(5), 0.8);
+        table.lateral[7] *= 1.5;
+        let stages = Arc::new(Mutex::new(Vec::new()));
+        let sink = Arc::clone(&stages);
+        let progress = Progress::to(move |stage| sink.lock().unwrap().push(stage.doing));
+        let options = Options { progress, pairs: false, ..Options::default() };
+        let watched = crate::verdict::diagnose(&table, &rig(), &options, String::new());
+        assert!(watched.report.with_suspects.is_some(), "{:?}", watched.report.scatter);
+        assert_eq!(stages.lock().unwrap().last(), Some(&"suspect passes"));
+    }
 }

@@ -195,7 +195,7 @@ pub fn diagnose(table: &Table, rig: &RigFile, options: &Options, sha256: String)
     options.progress.at("suspect passes", 0.96);
     let with_suspects = with_suspects(&fitted, table, rig, options);
     let mut remarks: Vec<String> = options.law.iter().map(|law| law.remark()).collect();
-    let own: Vec<&str> = options.own.iter().map(|e| effects::at(*e).name).collect();
+    let own: Vec<&str> = fitted.problem.own.iter().map(|e| effects::at(*e).name).collect();
     if !own.is_empty() {
         let own = own.join(", ");
         remarks.push(format!("Beside the library, causes of the user's own were candidates: {own}."));

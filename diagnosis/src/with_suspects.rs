@@ -3,6 +3,7 @@
 use crate::data::{RigFile, Table};
 use crate::decision::{Decision, Verdict, decide};
 use crate::hypotheses::{Fitted, Options, fit_believing};
+use crate::progress::Progress;
 use crate::scatter::Belief;
 use serde::Serialize;
 
@@ -51,7 +52,9 @@ pub fn with_suspects(
     if fitted.scatter.suspects.is_empty() {
         return None;
     }
-    let mut fitted = fit_believing(table, rig, options, &Belief::All);
+    // It is a second opinion: what leads in it is not what leads.
+    let silent = Options { progress: Progress::default(), ..options.clone() };
+    let mut fitted = fit_believing(table, rig, &silent, &Belief::All);
     let decision = decide(&mut fitted);
     let (effects, probability) = leading(&fitted, &decision);
     Some(WithSuspects { verdict: decision.verdict, effects, probability })

@@ -174,7 +174,6 @@ impl Master {
                 match connection.endpoint.due(now) {
                     Due::Nothing => {}
                     Due::SetPoints(set_points) => {
-                        #[allow(clippy::cast_possible_truncation, clippy::cast_sign_loss)] // 16 bits
                         let state = DriveState::of(connection.endpoint.value(self.map.status) as u16);
                         let control = state.and_then(DriveState::towards_enabled).unwrap_or(0);
                         self.process_data(connection, control, &set_points)?;

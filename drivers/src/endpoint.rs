@@ -292,7 +292,6 @@ impl Endpoint {
                 let (counts, si) = profile.turn(signal);
                 (signal, DeviceClock::new(counts * si))
             }),
-            #[allow(clippy::cast_possible_truncation, clippy::cast_sign_loss)] // 2^32 at most
             counter: frame.sequence.map(|signal| (signal, Counter::new(profile.turn(signal).0 as u64))),
             counted: 0,
         });
@@ -379,7 +378,6 @@ impl Endpoint {
     fn mark(&mut self, frame: FrameId, arrived: Nanos) -> Option<SampleMark> {
         let (time, health) = (&mut self.times[frame.0], &self.health);
         if let Some((signal, counter)) = &mut time.counter {
-            #[allow(clippy::cast_possible_truncation, clippy::cast_sign_loss)] // a count of 32 bits at most
             let count = self.values.get(*signal).max(0.0) as u64;
             match counter.step(count) {
                 Step::New { lost } => {
@@ -391,7 +389,6 @@ impl Endpoint {
                 }
                 Step::Reset => health.count(&health.clock_resets),
             }
-            #[allow(clippy::cast_possible_truncation)]
             {
                 time.counted = count as u32;
             }

@@ -170,7 +170,6 @@ pub enum Role {
 
 impl Role {
     /// Whether it takes no set-points.
-    #[must_use]
     pub const fn only_measures(self) -> bool {
         matches!(self, Self::Force | Self::Contacts)
     }
@@ -218,7 +217,6 @@ impl Links {
     }
 
     /// Switches off, ends the threads and says of each instrument how its link was closed, in the order of the setup.
-    #[must_use]
     pub fn close(mut self) -> Vec<LinkEnd> {
         self.end()
     }

@@ -23,7 +23,6 @@ impl ProfileError {
     }
 
     /// The same error with a remedy.
-    #[must_use]
     pub fn with_help(mut self, help: impl Into<String>) -> Self {
         self.help = help.into();
         self

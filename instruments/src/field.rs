@@ -30,7 +30,6 @@ pub enum NumberType {
 
 impl NumberType {
     /// Length in bytes.
-    #[must_use]
     pub const fn bytes(self) -> usize {
         match self {
             Self::U8 | Self::I8 => 1,
@@ -41,7 +40,6 @@ impl NumberType {
     }
 
     /// Smallest and largest value that the type can hold.
-    #[must_use]
     pub fn limits(self) -> (f64, f64) {
         match self {
             Self::U8 => (0.0, f64::from(u8::MAX)),

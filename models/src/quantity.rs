@@ -90,7 +90,6 @@ impl TryFrom<i8> for Direction {
 }
 
 /// Whether a number is zero: such a key is left out of a file.
-#[allow(clippy::trivially_copy_pass_by_ref, reason = "serde gives a reference")]
 pub(crate) fn is_zero(value: &f64) -> bool {
     *value == 0.0
 }

@@ -253,14 +253,13 @@ fn take_commands(state: &mut CycleState, inputs: &Inputs, now: Nanos) -> Control
                 controls.new_request = true;
             }
             Command::Render(request, marker) => {
-                // What is driven already goes on until the target's amplitude is known: a new phase changes
-                // nothing.
+                // What is driven goes on until the target's amplitude is known; a phase changes nothing.
                 let held = state.request.amplitude.metres().min(request.amplitude.metres());
                 let amplitude = PeakToPeak::from_metres(held.max(0.0));
                 if *marker != state.marker {
                     state.window.clear();
                 }
-                state.render = Some(Render::up_to(request.amplitude, state.render));
+                state.render.get_or_insert_default().largest = request.amplitude;
                 (state.request, state.marker) = (Request { amplitude, ..*request }, *marker);
                 controls.new_request = true;
             }

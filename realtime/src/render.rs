@@ -34,7 +34,8 @@ pub struct Rendered {
 /// What is remembered from cycle to cycle while a target is rendered.
 #[derive(Clone, Copy, Debug, Default)]
 pub struct Render {
-    largest: PeakToPeak,
+    /// Largest amplitude that it commands.
+    pub largest: PeakToPeak,
     last: Option<QuickAnswer>,
     /// Integral part of the feedback, in `mu'`.
     integral: f64,
@@ -50,11 +51,6 @@ pub struct Render {
 pub const MOST_CORRECTION: f64 = 0.5;
 
 impl Render {
-    /// Rendering up to an amplitude; what an earlier request had reached goes on.
-    pub fn up_to(largest: PeakToPeak, before: Option<Render>) -> Self {
-        Render { largest, ..before.unwrap_or_default() }
-    }
-
     /// What the measurement should show now; `None` before the first wanted value has come through.
     fn due(&mut self, wanted: f64, gains: &Feedback, cycle_s: f64) -> Option<f64> {
         let length = self.wanted.len();

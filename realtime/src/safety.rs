@@ -75,7 +75,6 @@ impl DriveCommand {
 
     /// The same command on the amplifier's own scale, where a certificate knows that scale: only its amplitude changes.
     /// An amplitude of zero, an answer that is not an amplitude, and one over the hard limit all become zero.
-    #[must_use]
     pub fn on_scale(self, set_point: impl FnOnce(PeakToPeak) -> Option<PeakToPeak>) -> Self {
         let allowed = |w: &PeakToPeak| (0.0..=HARD.amplitude_max.metres()).contains(&w.metres());
         let requested = Some(self.amplitude).filter(|w| self.enable && *w > PeakToPeak::ZERO);

@@ -431,7 +431,7 @@ impl Job {
         config.finger.lateral_stiffness_n_per_m = tip.finger.lateral_stiffness_n_per_m;
         // The finger is the rig's: it stays the same from run to run, and only noise and order follow the seed.
         let wrong = |e: sim::world::ConfigError| miette::miette!("the virtual rig: {e}");
-        let finger = sim::world::World::new(&config, virtual_rig.finger_seed).map_err(wrong)?.true_finger();
+        let finger = sim::world::World::new(&config, virtual_rig.finger_seed).map_err(wrong)?.finger;
         config.finger.normal_stiffness_n_per_m = finger.normal_stiffness_n_per_m;
         config.finger.lateral_stiffness_n_per_m = finger.lateral_stiffness_n_per_m;
         config.finger.stiffness_relative_sd = 0.0;

@@ -76,7 +76,8 @@ pub struct World {
     ticks: u64,
     every: [u64; 3],
     sequence: [u32; 2],
-    finger: Finger,
+    /// The fingertip's true properties: outside, for scoring only.
+    pub finger: Finger,
     pad: Pad,
     plate: Plate,
     /// The amplifier, and the relay in its supply: a wire of its own, whatever its link does.
@@ -307,10 +308,5 @@ impl World {
             temperature_c: self.room.of(Air::Temperature),
         };
         self.config.defects.plate(&at, self.known_pp_m)
-    }
-
-    /// The fingertip's true properties: for scoring only.
-    pub fn true_finger(&self) -> Finger {
-        self.finger
     }
 }

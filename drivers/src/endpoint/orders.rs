@@ -162,7 +162,6 @@ impl Endpoint {
     /// Whether a command that drives or moves, of which a part has left, may continue. Checked before each
     /// set-point that leaves by itself: the one before may have taken its time, and an 'off' may have come
     /// meanwhile. A newer command that drives or moves as well keeps it alive, and is handed out next.
-    #[must_use]
     pub fn still_wanted(&mut self, now: Nanos) -> bool {
         if let Some(mut newest) = self.newest_command() {
             newest.sent =

@@ -143,14 +143,12 @@ impl DriveState {
     }
 
     /// A status word that tells this state.
-    #[must_use]
     pub fn word(self) -> u16 {
         Self::TABLE.iter().find(|(.., state)| *state == self).map_or(0, |(_, value, _)| *value)
     }
 
     /// The control word that leads one step towards enabled; `None` where waiting is all that helps.
     /// A fault is never reset here: that is for a person.
-    #[must_use]
     pub const fn towards_enabled(self) -> Option<u16> {
         match self {
             Self::Disabled => Some(0x06),
@@ -162,7 +160,6 @@ impl DriveState {
     }
 
     /// The state after a control word, as a drive without delays has it.
-    #[must_use]
     pub const fn after(self, control: u16, reset_edge: bool) -> Self {
         if matches!(self, Self::Fault) {
             return if reset_edge { Self::Disabled } else { Self::Fault };

@@ -154,7 +154,6 @@ impl Check {
     pub const CRC_16_MODBUS: Self = Self::Crc(Cyclic::W16(&crc::CRC_16_MODBUS));
 
     /// Its name, a CRC's as the crate crc spells it.
-    #[must_use]
     pub fn name(self) -> &'static str {
         match self {
             Self::Sum7WithErrorBit => "sum7-with-error-bit",
@@ -167,14 +166,12 @@ impl Check {
     }
 
     /// Bytes that the check takes.
-    #[must_use]
     pub fn length(self) -> usize {
         if let Self::Crc(cyclic) = self { usize::from(cyclic.parts(None).0 / 8) } else { 1 }
     }
 
     /// The check of `body`, as the frame has it. `high_first`: its high byte comes first; left out, so
     /// it is with checks that are not reflected, as is usual.
-    #[must_use]
     pub fn of(self, body: &[u8], high_first: Option<bool>) -> Vec<u8> {
         match self {
             Self::Sum7WithErrorBit => vec![sum(body) & 0x7F],
@@ -192,7 +189,6 @@ impl Check {
     }
 
     /// Whether `check` fits `body`.
-    #[must_use]
     pub fn holds(self, body: &[u8], check: &[u8], high_first: Option<bool>) -> bool {
         match self {
             Self::Sum7WithErrorBit => check.len() == 1 && check[0] & 0x7F == sum(body) & 0x7F,

@@ -89,7 +89,7 @@ impl Compiler<'_> {
     fn read<T, E: Display>(&self, name: &str, parse: fn(&str) -> Result<T, E>) -> Result<T, ProfileError> {
         let text = (self.file)(name);
         let text = text.ok_or_else(|| self.at_text(name, format!("the file `{name}` is not there")))?;
-        parse(&text).map_err(|why| self.at_text(name, format!("{name}: {why}")))
+        parse(text.trim_start_matches('\u{feff}')).map_err(|why| self.at_text(name, format!("{name}: {why}")))
     }
 
     /// A refusal of a text of the profile, at its first place there.

@@ -75,7 +75,6 @@ impl Profile {
     /// The inputs of a frame for which its computed signals take the values in `unit_value`, as an emulator
     /// needs them. `known` are the values of other frames. `None` where the frame computes nothing, or not as
     /// many signals as it has inputs, or they do not depend on each other one to one.
-    #[must_use]
     pub fn inputs_for(
         &self,
         frame: FrameId,

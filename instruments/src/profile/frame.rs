@@ -55,7 +55,6 @@ pub struct Span {
 
 impl Span {
     /// The first register behind it.
-    #[must_use]
     pub const fn end(self) -> u32 {
         self.address as u32 + self.count as u32
     }
@@ -107,7 +106,6 @@ impl Part {
     }
 
     /// Its identifier, and whether that has 29 bits, for an instrument at that base.
-    #[must_use]
     pub const fn at(self, base: u32) -> (u32, bool) {
         let id = base.saturating_add(self.id);
         (id, self.extended || id > 0x7FF)

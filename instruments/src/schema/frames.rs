@@ -23,7 +23,6 @@ pub enum Table {
 
 impl Table {
     /// The function code that reads it.
-    #[must_use]
     pub const fn read_function(self) -> u8 {
         match self {
             Self::Coil => 1,
@@ -34,7 +33,6 @@ impl Table {
     }
 
     /// Whether its registers are single bits on the wire.
-    #[must_use]
     pub const fn is_bits(self) -> bool {
         matches!(self, Self::Coil | Self::Discrete)
     }

@@ -289,7 +289,8 @@ impl FrictionModel for Corrected {
     /// it; the relative friction is that force over `mu_0 F_n` with the loop's own `mu_0`.
     fn predict(&self, condition: &Condition) -> Result<Prediction, OutOfDomain> {
         condition.check()?;
-        self.effects.iter().filter_map(|c| c.effect.own).try_for_each(|own| own.reaches(condition))?;
+        let mut own = self.effects.iter().filter_map(|c| c.effect.own);
+        own.try_for_each(|own| own.factor(1.0, condition).map(drop))?;
         // The finger of today may rub more or less than that of the diagnosis: the loop's mu_0 counts.
         let baseline = Baseline { mu0: condition.mu0, ..self.baseline };
         let sign = condition.direction.sign();

@@ -104,7 +104,6 @@ impl Parameter {
 
     /// The same for a table about this normal force: what has the unit of a force grows with it, and with the stiffnesses that
     /// belong to it. Forces in another unit, or a finger in the place of a pin, then make the same verdict.
-    #[must_use]
     pub fn at_load(self, load_n: f64) -> Self {
         let power = match self.unit {
             "N" | "N/K" | "kg" => 1.0,

@@ -52,14 +52,6 @@ impl OwnTable {
     pub fn factor(&self, size: f64, condition: &Condition) -> Result<f64, OutOfDomain> {
         Ok((1.0 + size * self.change.at(condition)?[0]).max(0.0))
     }
-
-    /// Whether the table reaches a condition; else why not.
-    ///
-    /// # Errors
-    /// The first variable that lies beyond.
-    pub fn reaches(&self, condition: &Condition) -> Result<(), OutOfDomain> {
-        self.change.at(condition).map(drop)
-    }
 }
 
 /// Effects are known by their number wherever hypotheses are spelled, and are compared by it. So one that

@@ -129,7 +129,6 @@ impl<R: Read + Seek> Reader<R> {
     }
 
     /// Passes over messages of other topics than `topic`: they are checked, not given out.
-    #[must_use]
     pub fn only(mut self, topic: &'static str) -> Self {
         self.wanted = Wanted::Only(topic);
         self
@@ -149,7 +148,6 @@ impl<R: Read + Seek> Reader<R> {
     }
 
     /// Checks the messages and gives none out.
-    #[must_use]
     pub(super) fn no_messages(mut self) -> Self {
         self.wanted = Wanted::None;
         self

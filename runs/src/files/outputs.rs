@@ -36,6 +36,21 @@ const KINDS: [(&[u8], &[u8]); 9] = [
     (FLAT_MCAP, b""),
 ];
 
+/// What files of a format begin with, and the endings of their names; the last is that of all other texts.
+const FORMATS: [(&[u8], &[&str]); 9] = [
+    (b"<!doctype html>", &["html", "htm"]),
+    (MODEL, &["toml"]),
+    (NEXT_PLAN, &["toml"]),
+    (b"{", &["json", "jsonl", "jsonld", "ndjson"]),
+    (b"PAR1", &["parquet", "pq"]),
+    (b"ARROW1", &["arrow", "feather"]),
+    (b"\x89HDF", &["h5", "hdf5", "hdf", "nc"]),
+    (b"\x89MCAP0", &["mcap"]),
+    (b"", &["csv"]),
+];
+/// Endings of formats that are not written.
+const NOT_WRITTEN: [&str; 9] = ["pdf", "xlsx", "xls", "ods", "tsv", "npz", "mat", "zip", "png"];
+
 /// Writes a file that a person named as an output, as [`write_whole`] does, unless another file is there.
 ///
 /// # Errors
@@ -49,13 +64,26 @@ pub fn write_output(path: &Path, bytes: impl AsRef<[u8]>) -> miette::Result<()> 
 /// of the same kind. `output` is all of it, or what its kind begins with.
 ///
 /// # Errors
-/// Another file is there, or the name is that of a session's record in a run's folder.
+/// Another file is there, the name is that of a session's record in a run's folder, or its ending that of
+/// another format.
 pub fn replaceable(path: &Path, output: &[u8]) -> miette::Result<()> {
     if crate::run_dir::is_record(path) && path.with_file_name("run.toml").exists() {
         miette::bail!(
             help = "give another name",
             "{} is the name of a session's record in the folder of a run: nothing was replaced",
             path.display()
+        );
+    }
+    let named = path.extension().and_then(|e| e.to_str()).unwrap_or_default().to_lowercase();
+    let (_, endings) = FORMATS.iter().find(|(begins, _)| output.starts_with(begins)).expect("the last one");
+    let mut others = FORMATS.iter().flat_map(|(_, endings)| *endings).chain(&NOT_WRITTEN);
+    if !endings.contains(&&*named) && others.any(|other| **other == named) {
+        let right = path.with_extension(endings[0]);
+        miette::bail!(
+            help = format!("name it {}", right.display()),
+            "{}: this output is .{}, not .{named}",
+            path.display(),
+            endings[0]
         );
     }
     let plain = fs::metadata(path).is_ok_and(|there| there.is_file());
@@ -126,6 +154,35 @@ mod tests {
             let written = write_output(&path, output);
             assert_eq!(written.is_ok(), replaced, "{there}");
             assert_eq!(fs::read(&path).unwrap(), if replaced { output } else { there.as_bytes() });
+        }
+    }
+
+    /// The table of a study was Parquet under any name, as `report -o x.pdf` was a page.
+    #[test]
+    fn a_name_that_ends_as_another_format_is_refused() {
+        let folder = tempfile::tempdir().unwrap();
+        let table = b"point,time_s\n1,2\n".as_slice();
+        for (name, output, right) in [
+            ("all.csv", GATHERED, Some("all.parquet")),
+            ("verdict.pdf", PAGE, Some("verdict.html")),
+            ("model.json", MODEL, Some("model.toml")),
+            ("points.XLSX", table, Some("points.csv")),
+            ("points.tsv", table, Some("points.csv")),
+            ("signals.csv", FLAT_MCAP, Some("signals.mcap")),
+            ("cases.csv", b"{\"schema\":1,2}", Some("cases.json")),
+            ("all.parquet", GATHERED, None),
+            ("cases.JSONL", b"{\"schema\":1,2}", None),
+            ("spectrum.txt", table, None),
+            ("x.2026-11-30", table, None),
+            ("page", PAGE, None),
+        ] {
+            let path = folder.path().join(name);
+            let refused = write_output(&path, output).err();
+            assert_eq!(refused.is_some(), right.is_some(), "{name}");
+            assert_eq!(path.exists(), right.is_none(), "{name}");
+            if let (Some(why), Some(right)) = (refused, right) {
+                assert!(why.help().unwrap().to_string().ends_with(right), "{name}: {why}");
+            }
         }
     }
 

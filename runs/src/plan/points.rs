@@ -29,7 +29,6 @@ pub struct Point {
     pub edges: u32,
 }
 
-#[allow(clippy::trivially_copy_pass_by_ref, reason = "serde's form")]
 const fn is_zero(n: &u32) -> bool {
     *n == 0
 }

@@ -23,6 +23,10 @@ pub(super) fn table(path: &Path) -> miette::Result<Good> {
         rows.lines().next().is_some_and(|head| head.split([',', ';', '\t']).any(|h| h.trim() == column))
     };
     let good = |kind, passes| Good { kind, passes, remarks: Vec::new() };
+    if rows.starts_with("x_m,") {
+        let help = "check the plan that names it: muprime check PLAN";
+        miette::bail!(help = help, "{name} is a target to render: its plan's loads say what it may hold");
+    }
     if let Some(text) = text.filter(|_| has(models::law_table::ANSWERS[0].0) && !has("point")) {
         let loaded = runs::model_file::load(&name, text);
         loaded.map_err(|why| place::with_place_and_help(why, &name, Some("law table")))?;
