@@ -213,9 +213,8 @@ impl Endpoint {
         mut profile: Profile,
         setup: &InstrumentSetup,
     ) -> Result<(Self, AmplifierPort), SetupError> {
-        let positive = |gain: f64, key| match gain.is_finite() && gain > 0.0 {
-            true => Ok(gain),
-            false => Err(SetupError::NotPositive(key)),
+        let positive = |gain: f64, key| {
+            if gain.is_finite() && gain > 0.0 { Ok(gain) } else { Err(SetupError::NotPositive(key)) }
         };
         if let Some(gain) = setup.amplitude_m_per_unit {
             positive(gain, "amplitude_m_per_unit")?;

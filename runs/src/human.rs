@@ -62,10 +62,8 @@ pub fn to_its_uncertainty(value: f64, sd: f64) -> String {
 /// uncertainty, and by one power of ten; a pure number has no unit.
 pub fn with_uncertainty(value: f64, sd: f64, [low, high]: [f64; 2], unit: &str) -> String {
     let (stated, size) = (sd.is_finite() && sd > 0.0, value.abs().max(sd));
-    let exponent = match stated && !(1e-3..1e6).contains(&size) && size.is_finite() {
-        true => size.log10().floor() as i32,
-        false => 0,
-    };
+    let far = stated && !(1e-3..1e6).contains(&size) && size.is_finite();
+    let exponent = if far { size.log10().floor() as i32 } else { 0 };
     let factor = 10f64.powi(-exponent);
     let digits = if stated { (1 - (sd * factor).log10().floor() as i32).max(0) as usize } else { 0 };
     let [v, s, l, h] =

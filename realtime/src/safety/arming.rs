@@ -108,10 +108,8 @@ impl Safety {
             State::Faulted(_) => {
                 // An amplifier without supply has no fault of its own.
                 let open = step.supply.is_ok_and(|s| s.cut);
-                let besides = besides.map(|cause| match open && cause.may_be_an_open_supply() {
-                    true => Cause::SupplySwitch,
-                    false => cause,
-                });
+                let besides =
+                    besides.map(|c| if open && c.may_be_an_open_supply() { Cause::SupplySwitch } else { c });
                 let cut = self.supply_cut.max(step.cuts_the_supply).filter(|_| fitted);
                 let late = step.is_late.then_some(Cause::Overrun);
                 besides.or(cut.and_then(CutFor::needs_a_person)).or(late)

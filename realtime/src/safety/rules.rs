@@ -86,9 +86,10 @@ macro_rules! rules {
 }
 
 rules! {
-    "SR-35" EmergencyStop [Flag, Second] "A pressed, silent or broken emergency stop switches off and cuts the supply." => |c| contact_open(c, &c.seen.contacts.emergency_stop);
+    "SR-35" EmergencyStop [Flag, Second] "A pressed, silent or broken emergency stop switches off and cuts the supply." => |c| to_blame(c, &c.seen.contacts.emergency_stop);
     "SR-01" Stopped [Flag] "A stop switches off and latches." => |c| broken(c.controls.stop, 1.0, 0.0);
-    "SR-36" Interlock [Flag, Second] "An open, silent or broken interlock switches off." => |c| contact_open(c, &c.seen.contacts.interlock);
+    "SR-36" Interlock [Flag, Second] "An open, silent or broken interlock switches off." => |c| to_blame(c, &c.seen.contacts.interlock);
+    "SR-31" Suspended [Second] "A cycle that begins fifty periods after its deadline switches off: nothing controlled the rig meanwhile." => stood_still;
     "SR-02" DeadMan [Flag] "With a human finger, releasing the dead-man input switches off; it must be seen released, then held, before arming." => dead_man;
     "SR-03" Exposure [Second] "With a human finger, vibration in one go lasts no longer than its limit; only a rest of full length ends a go." => exposure;
     "SR-04" NormalOverforce [Newton] "Normal force stays below its limit, either sign." => |c| overforce(c, &c.watch.normal, c.limits.normal_force_max_n, c.limits.timing.normal.period);
@@ -116,7 +117,6 @@ rules! {
     "SR-26" StageStale [Second] "The stage's state is no older than its own periods and latency allow." => |c| state_stale(c.seen.stage.map(|s| s.taken_at), c.limits.timing.stage.age_limit(), c.now);
     "SR-27" StageFault [Flag] "A stage that reports a fault, or values that are not numbers, is stopped." => |c| broken(c.seen.stage.is_ok_and(|s| s.fault || !(s.position_m.is_finite() && s.velocity_m_s.is_finite())), 1.0, 0.0);
     "SR-28" OverTravel [Metre] "The stage stays within its travel." => travel;
-    "SR-31" Suspended [Second] "A cycle that begins fifty periods after its deadline switches off: nothing controlled the rig meanwhile." => |c| above(Some(c.seen.lateness.seconds()), SUSPENDED_CYCLES * c.limits.timing.cycle.seconds());
     "SR-29" Overrun [Count] "The loop misses fewer deadlines in a row than its limit (three by default), and of a thousand no more than another (ten by default); a skipped deadline is a missed one." => overrun;
     "SR-30" RequestRefused [Metre, MetrePerSecond, Newton, Hertz] "A request beyond any limit, or not finite, switches off." => request;
     "SR-32" StageNotFollowing [MetrePerSecond] "The stage follows its commanded speed: after its response time between a fifth and one and a half times that speed." => following;
@@ -157,15 +157,11 @@ pub(super) fn remark(c: &Context<'_>) -> Option<Remark> {
                     && amplitude_pp_m(c).is_some_and(|w| w < 0.7 * c.watch.commanded_pp_m)
             }
         };
-    if sags {
-        Some(Remark::AmplitudeSags)
-    } else if c.watch.lateral.share_came < REMARKED_SHARE {
-        Some(Remark::LateralLossy)
-    } else if c.watch.normal.share_came < REMARKED_SHARE {
-        Some(Remark::NormalLossy)
-    } else {
-        None
-    }
+    let lossy = |watch: &ForceWatch| watch.share_came < REMARKED_SHARE;
+    let (lateral, normal) = (lossy(&c.watch.lateral), lossy(&c.watch.normal));
+    let worst_first =
+        [(sags, Remark::AmplitudeSags), (lateral, Remark::LateralLossy), (normal, Remark::NormalLossy)];
+    worst_first.into_iter().find_map(|(is, remark)| is.then_some(remark))
 }
 
 fn lossy(c: &Context<'_>, share: f64) -> Option<(f64, f64)> {
@@ -211,6 +207,15 @@ fn contact_open(c: &Context<'_>, contact: &Result<Contact, NoData>) -> Option<(f
             Some((c.now.since(contact.taken_at).seconds(), timing.age_limit().seconds(), Unit::Second))
         }
     }
+}
+
+/// As [`contact_open`], save that what grew old while the loop stood still is not the fault of the contact.
+fn to_blame(c: &Context<'_>, contact: &Result<Contact, NoData>) -> Option<(f64, f64, Unit)> {
+    contact_open(c, contact).filter(|(.., unit)| *unit == Unit::Flag || stood_still(c).is_none())
+}
+
+fn stood_still(c: &Context<'_>) -> Option<(f64, f64)> {
+    above(Some(c.seen.lateness.seconds()), SUSPENDED_CYCLES * c.limits.timing.cycle.seconds())
 }
 
 fn dead_man(c: &Context<'_>) -> Option<(f64, f64)> {

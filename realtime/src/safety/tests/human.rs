@@ -123,6 +123,44 @@ fn a_contact_of_which_nothing_is_known_is_open() {
     }
 }
 
+/// Stopped for 200 ms (SR-31): everything is old, and no contact is blamed for it. What is open is blamed,
+/// and the supply is cut as ever.
+#[test]
+fn what_grew_old_while_the_loop_stood_still_is_not_to_blame() {
+    type Act = fn(&mut Guarded);
+    let acts: [(Act, Cause); 3] = [
+        (|_| {}, Cause::Suspended),
+        (|r| r.pressed = true, Cause::EmergencyStop),
+        (|r| r.open = true, Cause::Interlock),
+    ];
+    for (act, cause) in acts {
+        let mut rig = Guarded::driving();
+        for _ in 0..250 {
+            rig.cycle(|_| {}, Controls::default());
+        }
+        act(&mut rig);
+        let decision = rig.cycle(suspended, Controls::default());
+        assert_eq!(decision.tripped.map(|t| t.cause), Some(cause));
+        assert!(is_cut(&decision) && !decision.drive.enable(), "{cause:?}");
+    }
+    let stop = Controls { stop: true, ..Controls::default() };
+    assert_eq!(Guarded::driving().cycle(suspended, stop).tripped.map(|t| t.cause), Some(Cause::Stopped));
+}
+
+fn suspended(seen: &mut Observation) {
+    let old = |at: &mut Nanos| *at = Nanos(at.0.saturating_sub(200 * T.0));
+    seen.lateness = Nanos(200 * T.0);
+    for sample in [&mut seen.forces.lateral, &mut seen.forces.normal].into_iter().flatten() {
+        old(&mut sample.taken_at);
+    }
+    let contacts = &mut seen.contacts;
+    for contact in
+        [&mut contacts.emergency_stop, &mut contacts.interlock, &mut contacts.dead_man].into_iter().flatten()
+    {
+        old(&mut contact.taken_at);
+    }
+}
+
 #[test]
 fn a_human_finger_is_refused_where_anything_is_missing() {
     type Spoil = fn(&mut Observation);

@@ -244,7 +244,7 @@ rows! {
     22 "device_clock_back" ALL Channel(T::Force, F::ClockJump, -1.0, ON) => Off(cycles(1)), LateralStale | NormalStale;
     22 "device_clock_ahead" ALL Channel(T::Force, F::ClockJump, 1.0, ON) => Off(cycles(4)), LateralInvalid | NormalInvalid;
     22 "amplifier_clock_ahead" ALL Channel(T::Amplifier, F::ClockJump, 1.0, ON) => Off(cycles(1)), AmplifierStale;
-    23 "controller_suspended" ALL Paused(500) => Off(cycles(1)), Suspended | AmplifierWatchdog;
+    23 "controller_suspended" ALL Paused(500) => Off(cycles(1)), Suspended;
     24 "one_late_cycle" ALL Late { cycles: 1, every: 1, tenths: 25 } => NoTrip;
     24 "three_late_cycles" ALL Late { cycles: 3, every: 1, tenths: 15 } => Off(cycles(3)), Overrun;
     24 "thirty_deadlines_skipped" ALL Late { cycles: 1, every: 1, tenths: 300 } => Off(cycles(1)), Overrun;
