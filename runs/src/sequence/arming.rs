@@ -92,7 +92,7 @@ impl Arming {
                 return Next::GiveUp(Outcome::Tripped(trip));
             }
             self.disturbed = Some(trip);
-            self.cut_reported = trip.cause == Cause::EmergencyStop;
+            self.cut_reported = matches!(trip.cause, Cause::EmergencyStop | Cause::Suspended);
             return Next::Again(self.disturbed_by(trip.cause));
         }
         self.proving = row.proving.then_some(row.cycle).or(self.proving);

@@ -176,7 +176,7 @@ fn a_stall_before_arming_is_reported_and_the_second_channel_proved() {
 
 #[test]
 fn a_proof_that_a_stall_broke_off_is_made_again_and_told() {
-    for (ms, cause) in [(120, Cause::EmergencyStop), (48, Cause::Overrun)] {
+    for (ms, cause) in [(120, Cause::Suspended), (48, Cause::Overrun)] {
         let (outcome, events, rows) = swept(Before { proofs: Some((1, ms)), ..Before::default() });
         assert_eq!(outcome, Outcome::Complete, "{events:?}");
         assert_eq!(disturbed(&events), [(cause, ms)], "{events:?}");
