@@ -75,7 +75,7 @@ mod tests {
         assert!(stages.iter().any(|s| s.leading.len() > 3), "{stages:?}");
     }
 
-    /// It began the stages anew, and a diagnosis that was stopped then had its leading causes.
+    /// It reported the stages a second time; a diagnosis stopped meanwhile showed its leading causes.
     #[test]
     fn the_second_opinion_on_suspect_passes_reports_nothing() {
         let mut table = table(&mut Deviates(5), 0.8);
