@@ -5,13 +5,12 @@
 //! as a driver for a laboratory's own sensor would apply its calibration. Safety rules, sweep and
 //! comparison are those of `muprime run`.
 
-use models::prediction::{FrictionModel, SpringSlider};
+use models::{FrictionModel, SpringSlider};
 use realtime::cycle::{Command, CycleState};
+use realtime::cycle_io::{Ports, Tick, run_cycle};
 use realtime::ports::{ForceSensor, Forces, Nanos};
-use realtime::turn::{Ports, Tick, turn};
 use runs::plan::{Plan, Resolution};
-use runs::sequence::{Outcome, Sequence};
-use runs::setup::Setup;
+use runs::{Outcome, Setup, Sweep};
 use sim::virtual_rig::VirtualRig;
 use sim::world::WorldConfig;
 use std::collections::VecDeque;
@@ -46,7 +45,7 @@ pub fn sweep() -> Outcome {
     let resolution = Resolution { amplitude_pp_m: 1e-9, frequency_hz: 0.1 };
     let points = plan.points(1, &config.limits, &resolution).expect("a plan for this rig");
     let model: Arc<dyn FrictionModel> = Arc::new(SpringSlider::new(setup.tip.finger).expect("a fingertip"));
-    let mut sweep = Sequence::new(points, plan.file.pass, Arc::clone(&model), &setup.tip, setup.file.noise);
+    let mut sweep = Sweep::new(points, plan.file.pass, Arc::clone(&model), &setup.tip, setup.file.noise);
 
     let [force, amplifier, stage] =
         VirtualRig::new(&WorldConfig::bundled(), 7).expect("a virtual rig").split();
@@ -59,7 +58,7 @@ pub fn sweep() -> Outcome {
     for number in 1.. {
         let now = Nanos(number * config.limits.timing.cycle.0);
         let tick = Tick { number, lateness: Nanos(0), now };
-        let row = turn(&config, &*model, &mut state, &mut ports, &mut || commands.pop_front(), tick);
+        let row = run_cycle(&config, &*model, &mut state, &mut ports, &mut || commands.pop_front(), tick);
         let reaction = sweep.on_row(&row);
         commands.extend(reaction.commands);
         if let Some(done) = reaction.pass {

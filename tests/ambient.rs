@@ -1,15 +1,13 @@
 //! The air of a plan, from the list in the plan to the row of the table: set, waited for, found, or refused.
 //! Steps of a person at the rig: disarmed, answered, recorded.
 
-use models::prediction::SpringSlider;
-use realtime::cycle::Phase;
-use realtime::turn::Row;
-use runs::ambient::{Answers, Level, RigSide, Source, World};
+use models::SpringSlider;
+use realtime::{Phase, Row};
+use runs::ambient::{AmbientControl, Level, OperatorAnswers, Source, World};
 use runs::job::{Job, Signals, Update};
 use runs::plan::{Plan, Resolution};
-use runs::sequence::{Event, MeasuredPass, Outcome, Sequence};
-use runs::setup::Setup;
 use runs::supervisor::{self, Requests, VirtualLoop};
+use runs::{Event, MeasuredPass, Outcome, Setup, Sweep};
 use std::path::{Path, PathBuf};
 use std::sync::Arc;
 use tests::muprime;
@@ -306,20 +304,20 @@ fn every_step_of_a_person_finds_the_rig_disarmed() {
     let points = plan.points(1, &setup.config.limits, &resolution).unwrap();
     let model: Arc<dyn models::prediction::FrictionModel> =
         Arc::new(SpringSlider::new(setup.tip.finger).unwrap());
-    let mut sequence =
-        Sequence::new(points, plan.file.pass, Arc::clone(&model), &setup.tip, setup.file.noise)
-            .guarded_by(&setup.config.limits)
-            .at_rig(&plan, &setup);
+    let mut sweep = Sweep::new(points, plan.file.pass, Arc::clone(&model), &setup.tip, setup.file.noise)
+        .guarded_by(&setup.config.limits)
+        .at_rig(&plan, &setup);
     let world = sim::virtual_rig::VirtualRig::new(&sim::world::WorldConfig::ideal(), 1).unwrap().split();
     let air = World::Virtual(world[0].clone());
-    let mut rig_side = RigSide::open(&sequence, None, Some(air), Answers::Simulated).unwrap();
+    let mut ambient_control =
+        AmbientControl::open(&sweep, None, Some(air), OperatorAnswers::Simulated).unwrap();
     let [force, amplifier, stage] = world;
-    let ports = realtime::turn::Ports::new(Box::new(force), Box::new(amplifier), Box::new(stage.clone()));
-    let ports = realtime::turn::Ports { supply: Box::new(stage), ..ports };
+    let ports = realtime::cycle_io::Ports::new(Box::new(force), Box::new(amplifier), Box::new(stage.clone()));
+    let ports = realtime::cycle_io::Ports { supply: Box::new(stage), ..ports };
     let mut rig = VirtualLoop::new(setup.config, model, ports);
     let (mut asked, mut open_rows, mut events, mut passes) = (false, 0, Vec::new(), Vec::new());
     let outcome =
-        supervisor::sweep(&mut rig, &mut sequence, &mut Requests::default, &mut |row, sequence, reaction| {
+        supervisor::sweep(&mut rig, &mut sweep, &mut Requests::default, &mut |row, sweep, reaction| {
             let begins = reaction.events.iter().any(|e| matches!(e, Event::OperatorStep { .. }));
             let ends = reaction.events.iter().any(|e| matches!(e, Event::Answered { .. }));
             if asked || begins {
@@ -327,7 +325,7 @@ fn every_step_of_a_person_finds_the_rig_disarmed() {
                 at_rest(row);
             }
             asked = (asked || begins) && !ends;
-            rig_side.serve(row.now, sequence, &reaction);
+            ambient_control.serve(row.now, sweep, &reaction);
             passes.extend(reaction.pass);
             events.extend(reaction.events);
         });

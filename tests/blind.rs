@@ -1,9 +1,7 @@
 //! The diagnosis on sealed sets: few, fixed seeds; the full figures come from `muprime blind`.
-use diagnosis::Verdict;
 use diagnosis::data::{RigFile, Table};
-use diagnosis::hypotheses::Options;
-use diagnosis::verdict::{Report, diagnose};
-use models::pass::Pass;
+use diagnosis::{Options, Report, Verdict, diagnose};
+use models::Pass;
 use rayon::prelude::*;
 use sim::sealed::{Ask, Stratum, generate};
 use std::collections::BTreeSet;

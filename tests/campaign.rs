@@ -1,15 +1,15 @@
 //! A campaign from its file to the answers on its page.
 
-use models::prediction::SpringSlider;
+use models::SpringSlider;
 use rayon::prelude::*;
 use runs::campaign::{self, Campaign};
-use runs::job::{Job, Signals};
+use runs::{Job, Signals};
 use std::collections::BTreeMap;
 use std::io::{BufRead, BufReader};
 use std::path::Path;
 use std::process::{Command, Stdio};
 use std::sync::Arc;
-use studies::campaign::claims::{Answer, Claim, Trend, claims, trend};
+use studies::campaign::claims::{Claim, ClaimAnswer, Trend, claims, trend};
 use tests::muprime;
 
 /// The bundled campaign on a rig that is the spring-slider, with a seed and blocks of its own.
@@ -83,21 +83,26 @@ fn answers_are_right_on_three_natures() {
             let changes: Vec<f64> = all.iter().filter_map(|c| c.effect.map(|e| e.change)).collect();
             let truth = changes.iter().sum::<f64>() / changes.len() as f64;
             let margin = all[0].margin;
-            let count = |answer: Answer| all.iter().filter(|c| c.answer == answer).count();
+            let count = |answer: ClaimAnswer| all.iter().filter(|c| c.answer == answer).count();
             let is = trend([truth, truth], margin);
-            let right = if is == Some(all[0].expected) { Answer::Supported } else { Answer::Contradicted };
-            let other = if right == Answer::Supported { Answer::Contradicted } else { Answer::Supported };
+            let right =
+                if is == Some(all[0].expected) { ClaimAnswer::Supported } else { ClaimAnswer::Contradicted };
+            let other = if right == ClaimAnswer::Supported {
+                ClaimAnswer::Contradicted
+            } else {
+                ClaimAnswer::Supported
+            };
             println!(
                 "  {name:<20} true change {truth:+.3}: supported {}, contradicted {}, undecided {}",
-                count(Answer::Supported),
-                count(Answer::Contradicted),
-                count(Answer::Undecided)
+                count(ClaimAnswer::Supported),
+                count(ClaimAnswer::Contradicted),
+                count(ClaimAnswer::Undecided)
             );
             // Known without any campaign: the ratchet's dependences, and whether a film of air is there.
             let known = match *name {
-                "amplitude" | "frequency" | "speed" | "mu_0" => Some(Answer::Supported),
-                "ambient pressure" if nature == "squeeze film" => Some(Answer::Contradicted),
-                "ambient pressure" => Some(Answer::Supported),
+                "amplitude" | "frequency" | "speed" | "mu_0" => Some(ClaimAnswer::Supported),
+                "ambient pressure" if nature == "squeeze film" => Some(ClaimAnswer::Contradicted),
+                "ambient pressure" => Some(ClaimAnswer::Supported),
                 _ => None,
             };
             assert!(known.is_none_or(|known| 10 * count(known) >= 8 * all.len()), "{nature}: {name}");
@@ -108,7 +113,7 @@ fn answers_are_right_on_three_natures() {
             // Four cells leave one or two degrees of freedom between tips: no answer is owed there.
             let between = ["modulus", "human and artificial"].contains(name);
             if !between && (truth.abs() < 0.2 * margin || truth.abs() > 2.0 * margin) {
-                (owed, decided) = (owed + all.len(), decided + all.len() - count(Answer::Undecided));
+                (owed, decided) = (owed + all.len(), decided + all.len() - count(ClaimAnswer::Undecided));
             }
         }
     }
@@ -129,9 +134,9 @@ fn days_of_one_tip_do_not_tell_how_kinds_of_tips_differ() {
     let claims = answers(&campaign, "");
     for name in ["human and artificial", "modulus", "mu_0"] {
         let claim = claims.iter().find(|claim| claim.name == name).unwrap();
-        assert_eq!((claim.answer, claim.effect), (Answer::Undecided, None), "{claim:?}");
+        assert_eq!((claim.answer, claim.effect), (ClaimAnswer::Undecided, None), "{claim:?}");
     }
-    assert_eq!(claims[0].answer, Answer::Supported, "{:?}", claims[0]);
+    assert_eq!(claims[0].answer, ClaimAnswer::Supported, "{:?}", claims[0]);
 }
 
 /// What is complete is not made again, a copy of the folder answers the same, another campaign is refused

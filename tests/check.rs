@@ -1,6 +1,6 @@
 //! `check` against `run`: what one refuses, the other refuses; with place, cause and remedy, and all at once.
 
-use models::pass::Pass;
+use models::Pass;
 use serde_json::Value;
 use std::path::{Path, PathBuf};
 use tests::{documents, muprime, rounds, texts};
@@ -68,7 +68,7 @@ impl Made {
 /// A certificate of today, as `calibrate` would write it.
 fn certificate() -> String {
     use calibration::certificate::{
-        CertificateKind, Instrument, Occasion, Outcome, Parameter, RawData, Residuals,
+        CalibrationResult, CertificateKind, Instrument, Occasion, Parameter, RawData, Residuals,
     };
     let now = tests::waiting::now_unix_s() as u64;
     let parameter = Parameter {
@@ -79,7 +79,7 @@ fn certificate() -> String {
         degrees_of_freedom: 20.0,
         ci95: [0.98e-3, 1.02e-3],
     };
-    let outcome = Outcome {
+    let outcome = CalibrationResult {
         kind: CertificateKind::Latency,
         model: "a delay".into(),
         settings: Default::default(),

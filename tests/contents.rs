@@ -1,7 +1,7 @@
 //! A record in memory, with whatever it still holds.
 
+use realtime::Row;
 use realtime::recorder::{CYCLES, EVENTS, Entry, Integrity, PASSES, Reader};
-use realtime::turn::Row;
 use std::collections::BTreeMap;
 use std::io::Cursor;
 

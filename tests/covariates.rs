@@ -2,11 +2,9 @@
 
 use effects::corrected::{SavedEffect, SavedModel, SavedParameter};
 use effects::{Active, Baseline, Design, lateral_force};
-use models::condition::Condition;
 use models::pass::{Pass, write_passes};
-use models::quantity::{Direction, PeakToPeak};
-use runs::plan::Plan;
-use runs::setup::Setup;
+use models::{Condition, Direction, PeakToPeak};
+use runs::{Plan, Setup};
 use sim::world::WorldConfig;
 use std::path::Path;
 

@@ -1,13 +1,11 @@
 //! Lags and shifts in time that are withheld in the virtual rig are found in a run's edges, with their
 //! size; none is claimed where there is none, whatever else acts.
 
-use diagnosis::timing::{Comparison, judge, mean_delay_s};
-use models::prediction::SpringSlider;
+use diagnosis::report::timing::{Comparison, judge, mean_delay_s};
+use models::SpringSlider;
 use rayon::prelude::*;
 use runs::edges::Collector;
-use runs::plan::Plan;
-use runs::sequence::Outcome;
-use runs::setup::Setup;
+use runs::{Outcome, Plan, Setup};
 use sim::defects::Defects;
 use sim::world::WorldConfig;
 use std::sync::Arc;

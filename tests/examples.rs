@@ -50,5 +50,5 @@ fn every_plan_runs_on_the_setup_of_the_examples() {
 
 #[test]
 fn the_own_loop_runs_a_whole_sweep() {
-    assert_eq!(own_loop::sweep(), runs::sequence::Outcome::Complete);
+    assert_eq!(own_loop::sweep(), runs::sweep::Outcome::Complete);
 }

@@ -5,10 +5,8 @@
 
 use calibration::regression::linear;
 use calibration::uncertainty::Input;
-use models::condition::Condition;
 use models::pass::{Pass, coulomb_coefficient};
-use models::quantity::PeakToPeak;
-use models::rig_file::PassNoise;
+use models::{Condition, PassNoise, PeakToPeak};
 use nalgebra::{DMatrix, DVector};
 
 fn assert_close(got: f64, printed: f64, half_a_digit: f64) {

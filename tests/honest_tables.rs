@@ -1,10 +1,8 @@
 //! What a verdict must not depend on: the unit of force, where a run was split, a table handed over twice;
 //! and what two levels of a factor can say.
-use diagnosis::Verdict;
 use diagnosis::data::{RigFile, Table};
-use diagnosis::hypotheses::Options;
-use diagnosis::verdict::{Report, diagnose};
-use models::pass::Pass;
+use diagnosis::{Options, Report, Verdict, diagnose};
+use models::Pass;
 use rayon::prelude::*;
 use sim::defects::DefectKind;
 use sim::sealed::rough::{RoughSet, Roughness, rough};

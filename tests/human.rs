@@ -1,12 +1,10 @@
 //! A human finger, from the setup to the end of a sweep: refused with what is missing, armed by a hand, ended
 //! by its exposure. The finger is the virtual rig's, in virtual time: nobody is vibrated.
 
-use models::prediction::SpringSlider;
-use realtime::safety::Cause;
+use models::SpringSlider;
+use realtime::Cause;
 use runs::job::{Job, Signals, Update};
-use runs::plan::Plan;
-use runs::sequence::{Event, Outcome};
-use runs::setup::Setup;
+use runs::{Event, Outcome, Plan, Setup};
 use std::path::Path;
 use std::sync::Arc;
 
@@ -65,7 +63,7 @@ fn run(tables: &str, limits: &str, hand: bool) -> (Outcome, usize, usize, Vec<Ev
             events.push(event.clone());
         }
     };
-    let summary = rig::wall_run::run(job, &Signals::default(), &mut update).unwrap();
+    let summary = rig::wall_clock_run::run(job, &Signals::default(), &mut update).unwrap();
     (summary.outcome, summary.passes, summary.planned, events)
 }
 

@@ -2,8 +2,7 @@
 //! that go away, runs that are taken up again or were finished before, refusals that leave nothing behind.
 
 use runs::job::{Job, Signals, Update};
-use runs::plan::Plan;
-use runs::setup::Setup;
+use runs::{Plan, Setup};
 use std::collections::BTreeSet;
 use std::path::{Path, PathBuf};
 use std::process::{Command, Stdio};
@@ -132,7 +131,7 @@ fn a_drift_is_named_when_the_run_was_stopped_and_taken_up_again() {
             };
             let (signals, mut made) = (Signals::default(), 0);
             let stops = Arc::clone(&signals.stops);
-            rig::wall_run::run(job, &signals, &mut |update| {
+            rig::wall_clock_run::run(job, &signals, &mut |update| {
                 made += usize::from(matches!(update, Update::Pass(_)));
                 if stop == Some(made) {
                     stops.store(1, Ordering::Relaxed);

@@ -1,13 +1,12 @@
 //! A plan on a world in virtual time, of which nothing is stored but what the caller takes: for statistics.
 
-use models::prediction::FrictionModel;
+use models::FrictionModel;
 use realtime::compare::Agreement;
-use realtime::turn::{Ports, Row};
-use runs::ambient::{Answers, RigSide, World};
+use realtime::{Ports, Row};
+use runs::ambient::{AmbientControl, OperatorAnswers, World};
 use runs::plan::{Plan, Resolution};
-use runs::sequence::{MeasuredPass, Outcome, Sequence};
-use runs::setup::Setup;
 use runs::supervisor::{self, Requests, VirtualLoop};
+use runs::{MeasuredPass, Outcome, Setup, Sweep};
 use sim::virtual_rig::VirtualRig;
 use std::sync::Arc;
 
@@ -38,22 +37,21 @@ pub fn sweep_in_memory(
 ) -> Result<MemorySweep, Box<dyn std::error::Error>> {
     let resolution = Resolution { amplitude_pp_m: 1e-9, frequency_hz: 0.1 };
     let points = plan.points(seed, &setup.config.limits, &resolution)?;
-    let mut sequence =
-        Sequence::new(points, plan.file.pass, Arc::clone(&model), &setup.tip, setup.file.noise)
-            .at_rig(plan, setup);
+    let mut sweep = Sweep::new(points, plan.file.pass, Arc::clone(&model), &setup.tip, setup.file.noise)
+        .at_rig(plan, setup);
     let [force, amplifier, stage] = VirtualRig::new(world, seed)?.split();
     let air = World::Virtual(force.clone());
-    let mut rig_side = RigSide::open(&sequence, None, Some(air), Answers::Simulated)?;
+    let mut ambient_control = AmbientControl::open(&sweep, None, Some(air), OperatorAnswers::Simulated)?;
     let ports = Ports::new(Box::new(force), Box::new(amplifier), Box::new(stage));
     let mut rig = VirtualLoop::new(setup.config, model, ports);
     let (mut passes, mut cycles) = (Vec::new(), 0);
     let outcome =
-        supervisor::sweep(&mut rig, &mut sequence, &mut Requests::default, &mut |row, sequence, reaction| {
-            rig_side.serve(row.now, sequence, &reaction);
+        supervisor::sweep(&mut rig, &mut sweep, &mut Requests::default, &mut |row, sweep, reaction| {
+            ambient_control.serve(row.now, sweep, &reaction);
             each(row);
             cycles += 1;
             passes.extend(reaction.pass);
         });
-    let agreement = sequence.agreement(outcome == Outcome::Complete);
+    let agreement = sweep.agreement(outcome == Outcome::Complete);
     Ok(MemorySweep { passes, outcome, agreement, cycles })
 }

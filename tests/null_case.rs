@@ -1,12 +1,10 @@
 //! The null case: where the virtual rig keeps every assumption of the model, the comparison must say so, no
 //! more and no less; and how soon it notices one defect. The world shares no friction law with the model.
 
-use models::prediction::{FrictionModel, SpringSlider};
+use models::{FrictionModel, SpringSlider};
 use rayon::prelude::*;
 use realtime::compare::{Agreement, Lack};
-use runs::plan::Plan;
-use runs::sequence::Outcome;
-use runs::setup::Setup;
+use runs::{Outcome, Plan, Setup};
 use sim::defects::Defects;
 use sim::world::WorldConfig;
 use std::sync::Arc;

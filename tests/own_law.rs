@@ -2,13 +2,9 @@
 //! in a corrected model.
 
 use effects::{Baseline, Design};
-use models::condition::Condition;
-use models::finger::Finger;
 use models::law_table::LawTable;
 use models::pass::{Pass, write_passes};
-use models::prediction::FrictionModel;
-use models::quantity::{Direction, PeakToPeak};
-use models::rig_file::{PassNoise, RigFile};
+use models::{Condition, Direction, Finger, FrictionModel, PassNoise, PeakToPeak, RigFile};
 use rand_chacha::ChaCha8Rng;
 use rand_chacha::rand_core::{Rng, SeedableRng};
 use serde_json::{Value, json};

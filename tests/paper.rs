@@ -1,12 +1,10 @@
 //! Equation by equation: the spring-slider and the empirical law against the paper and against numbers
 //! that an independent time-domain simulation gave (quoted with the digits that it gave).
 
-use models::condition::Condition;
-use models::finger::Finger;
 use models::prediction::{EmpiricalPsi, FrictionModel, Regime, SpringSlider};
 use models::psi::{self, PsiEq16, PsiEq17};
-use models::quantity::PeakToPeak;
 use models::spring_slider;
+use models::{Condition, Finger, PeakToPeak};
 use std::f64::consts::PI;
 
 /// A condition with the given `w/h` and Psi of Eq. 17, for springs with `k_l/k_n = 1/(2(1+nu))`.

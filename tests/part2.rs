@@ -1,12 +1,9 @@
 //! The bundled plan `part2-validation` on virtual rigs: what the verdict says of each defect, and of rigs
 //! with and without air.
 
-use models::prediction::SpringSlider;
+use models::SpringSlider;
 use rayon::prelude::*;
-use runs::job::{Job, Signals};
-use runs::plan::Plan;
-use runs::sequence::Outcome;
-use runs::setup::Setup;
+use runs::{Job, Outcome, Plan, Setup, Signals};
 use sim::defects::{self, Defects};
 use std::collections::BTreeMap;
 use std::path::Path;

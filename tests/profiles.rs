@@ -1,6 +1,6 @@
 //! Profiles that a laboratory writes: those of docs/profiles.md hold, the program finds them, and their pages say what they read.
 
-use drivers::library::Source;
+use drivers::user_profiles::Source;
 use std::process::Stdio;
 use tests::file;
 use tests::peer::start;

@@ -4,21 +4,14 @@
 //! Two natures: the paper's finite element ridge, by its table, at a multiple of the stroke, on the virtual
 //! rig in virtual time and at once with many mu_0; and Eq. 20 itself.
 
-use models::condition::Condition;
-use models::finger::Finger;
-use models::prediction::SpringSlider;
 use models::psi::{PsiEq17, relative_friction};
-use models::quantity::PeakToPeak;
-use models::reading::Reading;
 use models::reading_evidence::{Decision, ReadingFinding, of_passes};
-use models::rig_file::PassNoise;
-use models::surrogate::Surrogate;
+use models::{Condition, Finger, PassNoise, PeakToPeak, Reading, SpringSlider, Surrogate};
 use rand_chacha::ChaCha8Rng;
 use rand_chacha::rand_core::{Rng, SeedableRng};
 use rayon::prelude::*;
 use runs::plan::{Plan, Resolution};
-use runs::sequence::Outcome;
-use runs::setup::Setup;
+use runs::{Outcome, Setup};
 use sim::world::WorldConfig;
 use std::sync::Arc;
 use tests::memory::sweep_in_memory;

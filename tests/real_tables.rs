@@ -2,10 +2,9 @@
 //! Their sources and licences stand beside them in `tests/recordings`.
 
 use diagnosis::data::{RigFile, Table};
-use diagnosis::decision::Verdict;
-use diagnosis::hypotheses::Options;
-use diagnosis::verdict::{Diagnosis, Report, diagnose};
-use models::pass::Pass;
+use diagnosis::verdict::Verdict;
+use diagnosis::{Diagnosis, Options, Report, diagnose};
+use models::Pass;
 use rand_chacha::ChaCha8Rng;
 use rand_chacha::rand_core::{Rng, SeedableRng};
 use tests::file;

@@ -1,16 +1,15 @@
 //! The promises that do not depend on the machine: the loop does not allocate, whatever the cycle does; the
 //! record's writer holds no more memory after hours than after seconds.
 
-use models::prediction::SpringSlider;
+use models::SpringSlider;
+use realtime::Nanos;
 use realtime::cycle::{Command, CycleState};
-use realtime::ports::Nanos;
+use realtime::cycle_io::{Ports, Row, Tick, run_cycle};
 use realtime::recorder::{Entry, Preamble, Reader, Recorder};
-use realtime::turn::{Ports, Row, Tick, turn};
 use ringbuf::HeapRb;
 use ringbuf::traits::{Consumer, Producer, Split};
 use runs::plan::{Plan, Resolution};
-use runs::sequence::Sequence;
-use runs::setup::Setup;
+use runs::{Setup, Sweep};
 use sim::virtual_rig::VirtualRig;
 use sim::world::WorldConfig;
 use std::alloc::{GlobalAlloc, Layout, System};
@@ -100,14 +99,14 @@ fn no_allocation_in_a_sweep(model: Arc<dyn models::prediction::FrictionModel>, c
     for number in 1..=cycles {
         let fresh = || {
             let points = plan.points(number, &config.limits, &resolution).unwrap();
-            Sequence::new(points, plan.file.pass, Arc::clone(&model), &setup.tip, setup.file.noise)
+            Sweep::new(points, plan.file.pass, Arc::clone(&model), &setup.tip, setup.file.noise)
         };
         let sequence_now = sequence.get_or_insert_with(fresh);
         let now = Nanos(number * config.limits.timing.cycle.0);
         let tick = Tick { number, lateness: Nanos(0), now };
         // Exactly what the loop's thread does in a cycle, with the virtual rig behind the ports.
         COUNTING.set(true);
-        let row = turn(&config, &*model, &mut state, &mut ports, &mut || queue.pop(), tick);
+        let row = run_cycle(&config, &*model, &mut state, &mut ports, &mut || queue.pop(), tick);
         let pushed = rows.try_push(row).is_ok();
         COUNTING.set(false);
         assert!(pushed);
@@ -214,7 +213,7 @@ fn what_is_decided_leaves_before_the_model_is_asked() {
         };
         cycle.store(number, Relaxed);
         let tick = Tick { number, lateness: Nanos(0), now: Nanos(number * 1_000_000) };
-        let row = turn(&setup.config, &model, &mut state, &mut ports, &mut || queue.take(), tick);
+        let row = run_cycle(&setup.config, &model, &mut state, &mut ports, &mut || queue.take(), tick);
         assert!(!(100..900).contains(&number) || row.drive_pp_m > 0.0, "{number}");
         stopped = stopped.or(row.tripped.map(|_| number));
     }
@@ -240,7 +239,7 @@ fn a_record_takes_no_more_memory_the_longer_it_gets() {
     for number in 1..=ROWS {
         COUNTING.set(false);
         let tick = Tick { number, lateness: Nanos(0), now: Nanos(number * 1_000_000) };
-        let row = turn(&setup.config, &model, &mut state, &mut ports, &mut || None, tick);
+        let row = run_cycle(&setup.config, &model, &mut state, &mut ports, &mut || None, tick);
         COUNTING.set(true);
         recorder.row(&row).unwrap();
         if number.is_multiple_of(50) {
@@ -312,12 +311,9 @@ fn corrected() -> effects::corrected::Corrected {
 /// allocates nothing.
 #[test]
 fn the_inverse_meets_what_is_wanted_at_scattered_conditions_without_allocation() {
-    use models::condition::Condition;
     use models::inverse::{MOST_EVALUATIONS, Reach, quick};
-    use models::law::BuiltIn;
     use models::law_table::grid::Grid;
-    use models::prediction::FrictionModel;
-    use models::quantity::PeakToPeak;
+    use models::{BuiltIn, Condition, FrictionModel, PeakToPeak};
     let finger = Setup::load("virtual").unwrap().tip.finger;
     let grid = Grid::parse(["amplitude_pp_m=0.05e-6..8e-6:33:log", "speed_m_s=0.004..0.2:9:log"]).unwrap();
     let mu = |c: &Vec<f64>| [1.0 - (-3.5e-5 * c[1] / c[0]).exp(), 0.02];

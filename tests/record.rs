@@ -1,9 +1,7 @@
 //! The record under abuse: cut at every byte, bits flipped.
 
 use realtime::recorder::{self, Integrity, Recovery};
-use runs::job::{Job, Signals};
-use runs::plan::Plan;
-use runs::setup::Setup;
+use runs::{Job, Plan, Setup, Signals};
 use std::io::Cursor;
 use std::sync::{Arc, LazyLock};
 use tests::contents::{Contents, read};
@@ -29,7 +27,7 @@ static RECORD: LazyLock<Vec<u8>> = LazyLock::new(|| {
         notes: Default::default(),
         answers: None,
     };
-    rig::wall_run::run(job, &Signals::default(), &mut |_| {}).unwrap();
+    rig::wall_clock_run::run(job, &Signals::default(), &mut |_| {}).unwrap();
     std::fs::read(out.join("run-1.mcap")).unwrap()
 });
 

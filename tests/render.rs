@@ -1,12 +1,11 @@
 //! Friction on demand on the virtual rig: a grating is rendered and measured, the record replays, the -3 dB
 //! frequency is that of the closed form, what a rig cannot follow is refused with its number.
 
+use realtime::Row;
 use realtime::recorder::{CYCLES, Entry, Reader};
-use realtime::turn::Row;
 use runs::fidelity::{Fidelity, Group, dynamics::Dynamics, of_run, read};
 use runs::job::{Job, Replayable, Signals, TARGET};
-use runs::plan::Plan;
-use runs::setup::Setup;
+use runs::{Plan, Setup};
 use std::path::Path;
 use std::sync::Arc;
 
@@ -39,7 +38,7 @@ fn job(out: &Path, render: &str, series: &str) -> Job {
 
 fn rendered(out: &Path, render: &str, series: &str) -> Fidelity {
     let summary = job(out, render, series).run_in_virtual_time(&Signals::default(), &mut |_| {}).unwrap();
-    assert_eq!(summary.outcome, runs::sequence::Outcome::Complete, "{:?}", summary.outcome);
+    assert_eq!(summary.outcome, runs::sweep::Outcome::Complete, "{:?}", summary.outcome);
     read(out).expect("the run's fidelity")
 }
 
@@ -353,7 +352,7 @@ fn with_effect(mut job: Job, effect: &str, seed: u64) -> Group {
     job.defects = sim::defects::Defects::sealed(effect, seed % 1000).ok();
     let out = job.out.clone();
     let made = job.run_in_virtual_time(&Signals::default(), &mut |_| {}).unwrap();
-    assert_eq!(made.outcome, runs::sequence::Outcome::Complete, "{effect} {seed}: {:?}", made.outcome);
+    assert_eq!(made.outcome, runs::sweep::Outcome::Complete, "{effect} {seed}: {:?}", made.outcome);
     read(&out).unwrap().groups.remove(0)
 }
 

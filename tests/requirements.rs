@@ -267,8 +267,8 @@ fn keys_of<T: serde::de::DeserializeOwned>() -> BTreeSet<String> {
 #[test]
 fn every_key_of_a_setup_and_of_rig_toml_has_its_word() {
     use drivers::{AxisSetup, InstrumentSetup, vibrometer::VibrometerSetup};
-    use models::rig_file::{Calibration, PassNoise, RigFile};
-    use runs::setup::{LimitsFile, Pace, SetupFile, VirtualRig};
+    use models::{Calibration, PassNoise, RigFile};
+    use runs::setup::{LimitsFile, Pace, SetupFile, VirtualRigConfig};
     let missing = |page: &str, keys: BTreeSet<String>| {
         let text = std::fs::read_to_string(file(page)).unwrap();
         let named = |key: &String| ["`", "[", "[["].iter().any(|open| text.contains(&format!("{open}{key}")));
@@ -277,7 +277,7 @@ fn every_key_of_a_setup_and_of_rig_toml_has_its_word() {
     let setup: BTreeSet<String> = [
         keys_of::<SetupFile>(),
         keys_of::<Pace>(),
-        keys_of::<VirtualRig>(),
+        keys_of::<VirtualRigConfig>(),
         keys_of::<LimitsFile>(),
         keys_of::<InstrumentSetup>(),
         keys_of::<AxisSetup>(),

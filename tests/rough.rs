@@ -1,9 +1,7 @@
 //! The verdict on scatter that is not what rig.toml states: few, fixed seeds; the full table comes from
 //! `muprime blind --noise all`.
-use diagnosis::Verdict;
 use diagnosis::data::RigFile;
-use diagnosis::hypotheses::Options;
-use diagnosis::verdict::Report;
+use diagnosis::{Options, Report, Verdict};
 use rayon::prelude::*;
 use sim::defects::DefectKind;
 use sim::sealed::rough::{RoughSet, Roughness, rough};

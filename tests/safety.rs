@@ -1,18 +1,16 @@
 //! What the tests of safety in wall-clock time judge, in virtual time and to the cycle: a hand that lets go of the dead-man key, an 'off'
 //! that is read back, and one that is not. Their twins: tests/wall/dead_man_key.rs, off_leaves.rs and ends.rs.
 
-use models::prediction::SpringSlider;
-use models::quantity::PeakToPeak;
+use models::{PeakToPeak, SpringSlider};
 use realtime::cycle::{Command, KEY_AGE, Marker, Phase};
 use realtime::ports::{
     Amplifier, AmplifierState, Contacts, ForceSensor, Forces, Nanos, NoData, SafetyInputs,
 };
 use realtime::safety::{Cause, DriveCommand, Remark, Request};
-use realtime::turn::{Ports, Row};
+use realtime::{Ports, Row};
 use runs::plan::{Plan, Resolution};
-use runs::sequence::{Event, MeasuredPass, Outcome, Sequence};
-use runs::setup::Setup;
 use runs::supervisor::{self, Loop, Requests, VirtualLoop};
+use runs::{Event, MeasuredPass, Outcome, Setup, Sweep};
 use sim::defects::Defects;
 use sim::virtual_rig::VirtualRig;
 use sim::world::WorldConfig;
@@ -182,21 +180,20 @@ fn swept(from_to: [f64; 2], frozen_after: u32, share: f64) -> Swept {
     let model: Arc<dyn models::prediction::FrictionModel> =
         Arc::new(SpringSlider::new(setup.tip.finger).unwrap());
     let noise = setup.file.noise;
-    let mut sequence = Sequence::new(points, plan.file.pass, Arc::clone(&model), &setup.tip, noise);
+    let mut sweep = Sweep::new(points, plan.file.pass, Arc::clone(&model), &setup.tip, noise);
     let [force, amplifier, stage] = VirtualRig::new(&WorldConfig::ideal(), 1).unwrap().split();
     let force = Stuck { force, from_to, shown: None };
     let amplifier = Damped { amplifier, share };
     let ports = Ports::new(Box::new(force), Box::new(amplifier), Box::new(stage));
     let mut rig = VirtualLoop::new(setup.config, model, ports);
     let (mut passes, mut events, mut measured) = (Vec::new(), Vec::new(), Vec::new());
-    let outcome =
-        supervisor::sweep(&mut rig, &mut sequence, &mut Requests::default, &mut |row, _, reaction| {
-            if row.marker.phase == Phase::Measure {
-                measured.push((row.marker.point, row.now.seconds()));
-            }
-            passes.extend(reaction.pass);
-            events.extend(reaction.events);
-        });
+    let outcome = supervisor::sweep(&mut rig, &mut sweep, &mut Requests::default, &mut |row, _, reaction| {
+        if row.marker.phase == Phase::Measure {
+            measured.push((row.marker.point, row.now.seconds()));
+        }
+        passes.extend(reaction.pass);
+        events.extend(reaction.events);
+    });
     (passes, events, measured, outcome)
 }
 

@@ -259,7 +259,7 @@ fn everything_bundled_passes_its_own_check() {
 /// with two deadlines missed.
 #[test]
 fn deadlines_that_were_missed_are_counted_with_their_lateness() {
-    use realtime::ports::Nanos;
+    use realtime::Nanos;
     use runs::job::{LATENESS_BOUNDS_S, Snapshots};
     use tests::memory::sweep_in_memory;
     let setup = runs::setup::Setup::load("virtual-ideal").unwrap();

@@ -4,7 +4,7 @@
 use serde_json::Value;
 use std::path::Path;
 use std::process::Output;
-use studies::cases::share::Share;
+use studies::cases::task_range::Share;
 use tests::study::{gathered, here, noop, run, said, text, worker};
 use tests::{documents, muprime, texts};
 

@@ -3,16 +3,14 @@
 //! Short by default. One simulated day: `MUPRIME_SOAK_VIRTUAL_S=86400 cargo test --release -p muprime-tests
 //! --test soak virtual_time -- --nocapture`.
 
-use models::condition::{Condition, OutOfDomain};
 use models::prediction::{EmpiricalPsi, FrictionModel, Prediction};
+use models::{Condition, OutOfDomain};
 use realtime::cycle::{Command, CycleState};
-use realtime::ports::Nanos;
+use realtime::cycle_io::{Ports, Tick, run_cycle};
 use realtime::recorder::{Preamble, Recorder};
-use realtime::safety::Cause;
-use realtime::turn::{Ports, Tick, turn};
+use realtime::{Cause, Nanos};
 use runs::plan::{Plan, Resolution};
-use runs::sequence::{Outcome, Sequence};
-use runs::setup::Setup;
+use runs::{Outcome, Setup, Sweep};
 use sim::virtual_rig::VirtualRig;
 use sim::world::WorldConfig;
 use std::collections::{BTreeMap, VecDeque};
@@ -65,7 +63,7 @@ fn a_day_in_virtual_time_without_a_trip() {
     let model = Arc::new(Held(EmpiricalPsi::paper(setup.tip.finger).unwrap(), Mutex::default()));
     let sweep = |seed: u64| {
         let points = plan.points(seed, &config.limits, &resolution).unwrap();
-        Sequence::new(points, plan.file.pass, Arc::clone(&model) as _, &setup.tip, setup.file.noise)
+        Sweep::new(points, plan.file.pass, Arc::clone(&model) as _, &setup.tip, setup.file.noise)
     };
     let folder = tempfile::tempdir().unwrap();
     let path = folder.path().join("day.mcap");
@@ -83,7 +81,7 @@ fn a_day_in_virtual_time_without_a_trip() {
     for number in 1..=cycles {
         let now = Nanos(number * config.limits.timing.cycle.0);
         let tick = Tick { number, lateness: Nanos(0), now };
-        let row = turn(&config, &*model, &mut state, &mut ports, &mut || queue.pop_front(), tick);
+        let row = run_cycle(&config, &*model, &mut state, &mut ports, &mut || queue.pop_front(), tick);
         // Every sweep ends with a stop, which latches as it must; nothing else does.
         let stopped = std::mem::take(&mut ended).then_some(Cause::Stopped);
         assert_eq!(row.tripped.map(|t| t.cause), stopped, "after {:.3} s", now.seconds());

@@ -1,13 +1,9 @@
 //! The ratio k_l/k_n, which decides the law of friction, from a rig's own passes: how often its 95 % interval holds the truth, and how wide it is.
 
 use calibration::finger::springs::{Springs, springs};
-use models::pass::Pass;
-use models::prediction::SpringSlider;
-use models::quantity::PeakToPeak;
+use models::{Pass, PeakToPeak, SpringSlider};
 use rayon::prelude::*;
-use runs::plan::Plan;
-use runs::sequence::Outcome;
-use runs::setup::Setup;
+use runs::{Outcome, Plan, Setup};
 use sim::finger::Finger;
 use sim::world::WorldConfig;
 use std::sync::Arc;

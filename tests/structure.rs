@@ -1,9 +1,7 @@
 //! Departures that no smooth map follows: sudden, periodic or local ones. That scatter alone is none: tests/rough.rs.
-use diagnosis::Verdict;
 use diagnosis::data::{RigFile, Table};
-use diagnosis::hypotheses::Options;
-use diagnosis::verdict::{Report, diagnose};
-use models::pass::Pass;
+use diagnosis::{Options, Report, Verdict, diagnose};
+use models::Pass;
 use rayon::prelude::*;
 use sim::sealed::rough::{Roughness, rough};
 use std::f64::consts::PI;

@@ -203,7 +203,7 @@ pub struct Occasion {
 
 /// What a calibration found, in the terms that every certificate shares.
 #[derive(Clone, Debug, PartialEq)]
-pub struct Outcome {
+pub struct CalibrationResult {
     /// What was calibrated.
     pub kind: CertificateKind,
     /// The model in words and symbols.
@@ -226,7 +226,7 @@ pub struct Outcome {
     pub budget: Vec<BudgetLine>,
 }
 
-impl Outcome {
+impl CalibrationResult {
     /// The sealed certificate of this outcome.
     pub fn certify(self, occasion: &Occasion) -> Certificate {
         Certificate {

@@ -7,9 +7,11 @@ pub mod friction;
 pub mod springs;
 pub mod stiffness;
 
-use crate::certificate::{BudgetLine, CertificateKind, Finding, Outcome, Parameter, Residuals, parameters};
+use crate::certificate::{
+    BudgetLine, CalibrationResult, CertificateKind, Finding, Parameter, Residuals, parameters,
+};
 use crate::identify::Identified;
-use crate::identify::skin::{IdentifiedSkin, Profile};
+use crate::identify::skin::{IdentifiedSkin, ProfileInterval};
 use crate::regression::FitError;
 use friction::FrictionFit;
 use nalgebra::DMatrix;
@@ -76,7 +78,7 @@ pub struct FingerFit {
 
 impl FingerFit {
     /// Everything that the certificate states.
-    pub fn outcome(&self) -> Outcome {
+    pub fn outcome(&self) -> CalibrationResult {
         let mut parts = Parts::default();
         self.stiffness.iter().for_each(|(name, stiffness)| parts.stiffness(name, stiffness));
         let mut settings = BTreeMap::new();
@@ -106,7 +108,7 @@ impl FingerFit {
                 ));
             }
         }
-        Outcome {
+        CalibrationResult {
             kind: CertificateKind::Finger,
             model: "F = F0 + k (x - x0) + loop; F1 = (k' + i k'') a in full contact; \
                     ln mu0 = ln m + (n - 1) ln(F/F0) + s ln(U/U0) + ln(1 + g (1 - exp(-t/tau)))"
@@ -228,7 +230,7 @@ impl Parts {
                 "{verdict}: freeing penalty and retardation time lowers chi-square by {gain:.1} to {:.1}",
                 skin.chi2
             ));
-            let quantities: [(&str, &str, &'static str, &Profile); 3] = [
+            let quantities: [(&str, &str, &'static str, &ProfileInterval); 3] = [
                 ("modulus", " Pa", "", &skin.young_modulus_pa),
                 ("penalty over modulus", "", "stratum_corneum.penalty_ratio", &skin.penalty_ratio),
                 ("retardation time", " s", "stratum_corneum.retardation_time", &skin.retardation_time_s),

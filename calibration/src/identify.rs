@@ -10,7 +10,7 @@ pub mod skin;
 
 use crate::phase::table::PhasePoint;
 use crate::regression::ends;
-use models::quantity::PeakToPeak;
+use models::PeakToPeak;
 use serde::Serialize;
 
 /// The range searched, and what is known of the model's own error.

@@ -5,7 +5,7 @@
 
 pub mod clock;
 
-use crate::certificate::{BudgetLine, CertificateKind, Finding, Outcome, Residuals, parameters};
+use crate::certificate::{BudgetLine, CalibrationResult, CertificateKind, Finding, Residuals, parameters};
 use crate::uncertainty::Input;
 use statrs::distribution::{ChiSquared, ContinuousCDF};
 use std::collections::BTreeMap;
@@ -91,7 +91,7 @@ pub fn channel_delay(
 }
 
 /// Everything that a latency certificate states: delays of the channels, and clocks where they were compared.
-pub fn outcome(channels: &[ChannelDelay], clocks: &[(String, clock::ClockFit)]) -> Outcome {
+pub fn outcome(channels: &[ChannelDelay], clocks: &[(String, clock::ClockFit)]) -> CalibrationResult {
     let mut findings = Vec::new();
     let mut budget = Vec::new();
     for c in channels {
@@ -111,7 +111,7 @@ pub fn outcome(channels: &[ChannelDelay], clocks: &[(String, clock::ClockFit)]) 
     let covariance = Finding::covariance(&findings, &[]);
     let jitter = channels.iter().map(|c| c.jitter_s).fold(0.0, f64::max);
     let largest = channels.iter().map(|c| (c.range_s[1] - c.delay.value).max(c.delay.value - c.range_s[0]));
-    Outcome {
+    CalibrationResult {
         kind: CertificateKind::Latency,
         model: "t_channel = t_event + delay + jitter; t_device = (1 + clock_rate_error) t_host + constant"
             .into(),

@@ -14,9 +14,10 @@
 //! | [`regression`], [`uncertainty`] | least squares; GUM |
 //! | `rows` | rows of a CSV table, with the column of what cannot be read |
 //!
-//! The way through: data file -> a module's fit, which refuses what is unfit -> [`certificate::Outcome`] ->
-//! [`certificate::Certificate`] (a sealed TOML file) -> [`certificate::Certificate::verify`] ->
-//! [`force::apply::ForceCalibration`] or [`amplitude::apply::AmplitudeCalibration`] in the loop.
+//! The way through: data file -> a module's fit, which refuses what is unfit ->
+//! [`certificate::CalibrationResult`] -> [`certificate::Certificate`] (a sealed TOML file) ->
+//! [`certificate::Certificate::verify`] -> in the loop: [`force::apply::ForceCalibration`] or
+//! [`amplitude::apply::AmplitudeCalibration`].
 
 pub mod amplitude;
 pub mod certificate;

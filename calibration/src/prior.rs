@@ -5,7 +5,7 @@ use crate::amplitude::apply::AmplitudeCalibration;
 use crate::certificate::{CertificateKind, Refusal, Verified};
 use crate::force::apply::ForceCalibration;
 use crate::force::zero::Zero;
-use models::rig_file::Calibration;
+use models::Calibration;
 
 /// Takes one verified certificate into what is known, at a temperature. Kinds that say nothing of the
 /// readings change nothing.

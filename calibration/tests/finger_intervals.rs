@@ -6,7 +6,7 @@ use muprime_calibration::finger::FingerFit;
 use muprime_calibration::finger::friction::{FrictionPoint, friction};
 use muprime_calibration::finger::stiffness::{UltrasonicPoint, ultrasonic};
 use muprime_calibration::identify::Identified;
-use muprime_calibration::identify::skin::{IdentifiedSkin, Profile};
+use muprime_calibration::identify::skin::{IdentifiedSkin, ProfileInterval};
 use rand::{RngExt, SeedableRng};
 use rand_chacha::ChaCha12Rng;
 
@@ -92,7 +92,7 @@ fn a_stiffness_and_a_loss_near_zero_have_intervals_that_begin_there() {
 
 #[test]
 fn the_stratum_corneum_keeps_the_ends_of_its_profiles() {
-    let profile = |best, ci95| Profile { best, ci95, closed: [true; 2], gaps: false };
+    let profile = |best, ci95| ProfileInterval { best, ci95, closed: [true; 2], gaps: false };
     let elastic = Identified {
         young_modulus_pa: 28e6,
         ci95_pa: [21e6, 90e6],

@@ -1,7 +1,7 @@
 //! The inverse analysis on the finite element model: phases made by a finer mesh and a smaller step, with
 //! 5 degrees of noise on each reading and ten readings a point as in the paper (section 2.2).
 
-use models::quantity::PeakToPeak;
+use models::PeakToPeak;
 use models::ridge::{PhaseCurves, RidgeCase, RunSettings, Skin, SkinGrid, run};
 use muprime_calibration::identify::{Search, identify};
 use muprime_calibration::phase::table::PhasePoint;

@@ -184,7 +184,7 @@ fn ended() -> ExitCode {
     runs::setup::look_in(cli.profiles);
     let json = cli.json;
     studies::progress::JSON.store(json, std::sync::atomic::Ordering::Relaxed);
-    let code = runs::leave::until_the_end(move || run(cli.verb, json), cli::INTERNAL);
+    let code = runs::exit::until_the_end(move || run(cli.verb, json), cli::INTERNAL);
     // Whoever leaves at once leaves others no time for it.
     rig::terminal::give_back();
     cli::keep_unread();

@@ -1,11 +1,9 @@
 //! The table: what was measured, and what the design can show. docs/diagnosis/model.md, section 1.
 
 use effects::{Design, Need};
-use models::condition::Condition;
 use models::covariate::{self, Scale};
-use models::pass::Pass;
-use models::quantity::PeakToPeak;
 pub use models::rig_file::RigFile;
+use models::{Condition, Pass, PeakToPeak};
 
 /// A table that the diagnosis refuses, and what would mend it.
 #[derive(Debug, thiserror::Error, PartialEq)]

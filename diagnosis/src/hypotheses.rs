@@ -11,30 +11,33 @@
 //!
 //! `Candidate` is a hypothesis with its evidence, `Posterior` the mode of one law, `Fitted` all of them with
 //! the table as it was believed. `Belief` says which passes belong; `Search` is what every search shares.
-//! Nothing here decides: that is [`crate::decision`].
+//! Nothing here decides: that is [`crate::verdict`].
 
-use crate::bases::{Basis, Kernels};
+pub mod fitted;
+pub mod pairs;
+pub mod singles;
+pub mod structure;
+
+pub use fitted::{Candidate, Fitted};
+pub use pairs::pairs;
+pub(crate) use singles::{SINGLES_END, Search, lapsed, singles, sort, unlisted};
+pub use structure::{Structure, structure};
+
+use crate::base_law::BaseLaw;
 use crate::constants::Constants;
 use crate::data::{RigFile, Table};
-use crate::evidence::{Posterior, averaged_over_form};
-use crate::fit::Problem;
-pub use crate::fitted::{Candidate, Fitted};
-use crate::gaussian::log_sum_exp;
-use crate::law::BaseLaw;
-use crate::layout::{Layout, NUISANCES};
-use crate::least_squares::minimise;
-use crate::noise::settle;
-use crate::pairs::pairs;
 use crate::progress::Progress;
-use crate::scatter::Belief;
-use crate::singles::{SINGLES_END, Search, lapsed, singles, sort, unlisted};
-use crate::starts::tempered;
-use crate::structure::{shapes, structure};
+use crate::regression::{
+    Basis, Kernels, Layout, NUISANCES, Posterior, Problem, averaged_over_form, log_sum_exp, minimise,
+    tempered,
+};
+use crate::scatter::{Belief, settle};
 use effects::{Effect, library, one_cause};
-use models::condition::Condition;
+use models::Condition;
 use rayon::prelude::*;
 use std::collections::BTreeSet;
 use std::sync::Arc;
+use structure::shapes;
 
 /// Choices of a diagnosis.
 #[derive(Debug, Clone)]
@@ -100,20 +103,7 @@ pub fn fit_believing(table: &Table, rig: &RigFile, options: &Options, belief: &B
     let loose = tempered(&problem, &gap, k.start_share);
     let nuisances = minimise(&problem, &[], &none.u, &loose, ROUNDS[1]).u;
 
-    let mut not_testable = Vec::new();
-    let mut tried = Vec::new();
-    for index in (0..library().len()).chain(options.own.iter().copied()) {
-        let effect = effects::at(index);
-        if options.without.iter().any(|n| n == effect.name) {
-            continue;
-        }
-        let lacks = table.lacks(effect.needs).map(|because| certified(effect, rig).unwrap_or(because));
-        match lacks.or_else(|| beyond(&problem, table, effect)) {
-            Some(because) => not_testable.push((effect.name, because)),
-            None => tried.push(index),
-        }
-    }
-
+    let (tried, not_testable) = testable(&problem, table, rig, options);
     problem.own = tried.iter().copied().filter(|e| options.own.contains(e)).collect();
     let known: Vec<usize> = tried.iter().copied().chain(library().len()..effects::known().len()).collect();
     let kernels = Kernels::on(&problem, table, &known);
@@ -187,18 +177,43 @@ pub fn fit_believing(table: &Table, rig: &RigFile, options: &Options, belief: &B
         basis,
     };
     fitted.weigh();
-    // What the leading cause explains after all belongs; it counted for little, and is not called suspect.
-    let surest = fitted.none_probability.max(fitted.unknown_probability);
-    if let Some(c) = fitted.candidates.first().filter(|c| c.probability > surest) {
-        let (problem, inflation) = (&fitted.problem, &fitted.scatter.inflation);
-        let explains = |row: usize| {
-            let own = problem.whole_variance(row) / inflation[row];
-            let left = problem.lateral[row] - c.best.mechanism[row];
-            left.powi(2) < problem.constants.explained_sd.powi(2) * own
-        };
-        fitted.scatter.suspects.retain(|s| !explains(s.row));
-    }
+    clear_explained(&mut fitted);
     fitted
+}
+
+/// The causes that the table can show, and those that it cannot, each with the reason.
+fn testable(
+    problem: &Problem,
+    table: &Table,
+    rig: &RigFile,
+    options: &Options,
+) -> (Vec<usize>, Vec<(&'static str, String)>) {
+    let (mut tried, mut not_testable) = (Vec::new(), Vec::new());
+    for index in (0..library().len()).chain(options.own.iter().copied()) {
+        let effect = effects::at(index);
+        if options.without.iter().any(|n| n == effect.name) {
+            continue;
+        }
+        let lacks = table.lacks(effect.needs).map(|because| certified(effect, rig).unwrap_or(because));
+        match lacks.or_else(|| beyond(problem, table, effect)) {
+            Some(because) => not_testable.push((effect.name, because)),
+            None => tried.push(index),
+        }
+    }
+    (tried, not_testable)
+}
+
+/// What the leading cause explains after all belongs; it counted for little, and is not called suspect.
+fn clear_explained(fitted: &mut Fitted) {
+    let surest = fitted.none_probability.max(fitted.unknown_probability);
+    let Some(c) = fitted.candidates.first().filter(|c| c.probability > surest) else { return };
+    let (problem, inflation) = (&fitted.problem, &fitted.scatter.inflation);
+    let explains = |row: usize| {
+        let own = problem.whole_variance(row) / inflation[row];
+        let left = problem.lateral[row] - c.best.mechanism[row];
+        left.powi(2) < problem.constants.explained_sd.powi(2) * own
+    };
+    fitted.scatter.suspects.retain(|s| !explains(s.row));
 }
 
 /// Pairs of the single causes that are not among the candidates: all but those of one cause by two names.

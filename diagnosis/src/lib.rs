@@ -3,37 +3,19 @@
 //! | module | purpose |
 //! |---|---|
 //! | [`data`] | the table: passes in the order of measurement, and what its design can show |
-//! | [`noise`], [`scatter`] | the variance of each pass, from rig.toml, replicates and the table itself: suspects, shifts of runs |
-//! | [`constants`], [`progress`], `draws` | tunable constants; progress; repeatable random numbers |
-//! | [`law`] | a base law in place of the spring-slider |
-//! | [`member`], [`fit`], [`layout`], [`least_squares`] | the regression problem of a hypothesis, its vector of parameters, its fit |
-//! | [`gaussian`], [`kernel`] | Gaussian algebra of low rank; smooth functions over the operating space |
-//! | [`departure`] | how a hypothesis may depart from its form: smoothly, and by bending what its cause acts on |
-//! | [`bases`] | the smooth functions by which it may, on one table |
-//! | [`evidence`] | marginal likelihood by Laplace's method, with that departure |
-//! | [`recalibration`] | what recalibrating the baseline imitates of a change |
-//! | [`discrepancy`] | the open set: a Gaussian-process discrepancy of the baseline |
-//! | [`starts`], [`singles`], [`pairs`], [`hypotheses`] | global starts; one cause, two causes, all with their probabilities |
-//! | [`left_out`] | extrapolation to left-out regions of the operating space |
-//! | [`fitted`], [`decision`] | probabilities; the verdict rule |
-//! | [`structure`] | jumps, bumps, periods, memories and other departures that no smooth map follows |
-//! | [`intervals`], [`pulls`] | profile intervals; how far the stiffnesses went from their calibration |
-//! | [`locate`] | which part of the operating space, and of the rig, carries the gap |
-//! | [`shrinkage`], [`predict`], [`novelty`], `run_shifts` | held-out passes; predictions, also in runs |
-//! | [`next`], [`power`] | the experiment that separates the leading hypotheses; detectable sizes |
-//! | [`reading`] | which reading of the paper's w the passes favour |
-//! | [`unstated`] | what conditions must state before the verdict's model predicts them |
-//! | [`describe`] | what an unknown departure looks like; causes that are sure all the same |
-//! | [`mod@format`] | names and numbers in the sentences of a verdict |
-//! | [`timing`] | what the edges in a run's record say of lags and shifts in time |
-//! | [`verdict`], [`document`], [`remarks`], [`certificates`], [`saved`] | report, JSON, remarks, model |
-//! | [`with_suspects`] | the verdict if suspect passes counted as any other |
+//! | [`base_law`] | a base law in place of the spring-slider |
+//! | [`scatter`] | the variance of each pass, from rig.toml, replicates and the table: suspects, shifts of runs |
+//! | [`regression`] | the fit of one hypothesis, its smooth departure from its form, its evidence |
+//! | [`hypotheses`] | no gap, one cause, two causes and the open set, with their probabilities |
+//! | [`verdict`] | the answer and the rule that gives it; extrapolation to left-out regions |
+//! | [`report`] | beside the answer: where, how far, intervals, what next; JSON, sentences, saved model |
+//! | [`constants`], [`progress`], `random` | tunable constants; progress; repeatable random numbers |
 //!
 //! docs/diagnosis/model.md states the whole model once, with the module of each section. An example:
 //!
 //! ```
 //! use models::pass::read_passes;
-//! use muprime_diagnosis::{Verdict, data::{RigFile, Table}, hypotheses::Options, verdict::diagnose};
+//! use muprime_diagnosis::{Verdict, data::{RigFile, Table}, hypotheses::Options, report::diagnose};
 //!
 //! // Twelve passes of a plate that stands still: friction of 0.5 N/N in both directions, repeatable to half a per cent.
 //! let mut csv = String::from("point,time_s,amplitude_pp_m,frequency_hz,speed_m_s,direction,position_m,normal_force_n,lateral_force_n\n");
@@ -49,53 +31,20 @@
 //! # Ok::<(), Box<dyn std::error::Error>>(())
 //! ```
 
-pub mod bases;
-pub mod certificates;
+pub mod base_law;
 pub mod constants;
 pub mod data;
-pub mod decision;
-pub mod departure;
-pub mod describe;
-pub mod discrepancy;
-pub mod document;
-mod draws;
-pub mod evidence;
-pub mod fit;
-pub mod fitted;
-pub mod format;
-pub mod gaussian;
 pub mod hypotheses;
-pub mod intervals;
-pub mod kernel;
-pub mod law;
-pub mod layout;
-pub mod least_squares;
-pub mod left_out;
-pub mod locate;
-pub mod member;
-pub mod next;
-pub mod noise;
-pub mod novelty;
-pub mod pairs;
-pub mod power;
-pub mod predict;
 pub mod progress;
-pub mod pulls;
-pub mod reading;
-pub mod recalibration;
-pub mod remarks;
-mod run_shifts;
-pub mod saved;
+mod random;
+pub mod regression;
+pub mod report;
 pub mod scatter;
-pub mod shrinkage;
-pub mod singles;
-pub mod starts;
-pub mod structure;
 #[cfg(test)]
 mod tests;
-pub mod timing;
-pub mod unstated;
 pub mod verdict;
-pub mod with_suspects;
 
-pub use decision::Verdict;
+pub use data::Table;
+pub use hypotheses::Options;
+pub use report::{Diagnosis, Hypothesis, Report, diagnose, predict::Forecast};
+pub use verdict::Verdict;

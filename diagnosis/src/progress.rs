@@ -64,9 +64,9 @@ mod tests {
         let quiet = Options { pairs: false, ..Options::default() };
         let progress = Progress::to(move |stage| sink.lock().unwrap().push(stage));
         let options = Options { progress, ..quiet.clone() };
-        let alone = crate::verdict::diagnose(&table, &rig(), &quiet, String::new());
-        let watched = crate::verdict::diagnose(&table, &rig(), &options, String::new());
-        let outcome = |d: &crate::verdict::Diagnosis| -> Vec<(Vec<String>, u64)> {
+        let alone = crate::report::diagnose(&table, &rig(), &quiet, String::new());
+        let watched = crate::report::diagnose(&table, &rig(), &options, String::new());
+        let outcome = |d: &crate::report::Diagnosis| -> Vec<(Vec<String>, u64)> {
             d.report.hypotheses.iter().map(|h| (h.effects.clone(), h.probability.to_bits())).collect()
         };
         assert_eq!(outcome(&alone), outcome(&watched));
@@ -84,7 +84,7 @@ mod tests {
         let sink = Arc::clone(&stages);
         let progress = Progress::to(move |stage| sink.lock().unwrap().push(stage.doing));
         let options = Options { progress, pairs: false, ..Options::default() };
-        let watched = crate::verdict::diagnose(&table, &rig(), &options, String::new());
+        let watched = crate::report::diagnose(&table, &rig(), &options, String::new());
         assert!(watched.report.with_suspects.is_some(), "{:?}", watched.report.scatter);
         assert_eq!(stages.lock().unwrap().last(), Some(&"suspect passes"));
     }

@@ -13,15 +13,17 @@
 
 pub(crate) mod clusters;
 mod lasting;
+pub mod noise;
 mod serial;
 mod surface;
 mod suspects;
 
-use crate::bases::beside_each_other;
+pub(crate) use clusters::{Space, moments, shuffled, strongest};
+pub use noise::{PureError, settle, variance};
+
 use crate::constants::Constants;
 use crate::data::Table;
-use crate::discrepancy::lengths;
-use crate::fit::Problem;
+use crate::regression::{Problem, beside_each_other, lengths};
 use nalgebra::{DMatrix, DVector};
 use rayon::prelude::*;
 use serde::Serialize;

@@ -2,9 +2,7 @@
 
 use crate::data::{RigFile, Table};
 use effects::{Active, Baseline, Design, by_name, lateral_force};
-use models::condition::Condition;
-use models::quantity::{Direction, PeakToPeak};
-use models::rig_file::PassNoise;
+use models::{Condition, Direction, PassNoise, PeakToPeak};
 
 /// Normal deviates of a linear congruential generator, by the sum of twelve.
 pub struct Deviates(pub u64);

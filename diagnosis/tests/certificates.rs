@@ -1,10 +1,8 @@
 //! What a certificate leaves open bounds the prior of what it certifies, and nothing else.
-use models::condition::Condition;
-use models::pass::Pass;
-use models::quantity::{Direction, PeakToPeak};
 use models::rig_file::{CertifiedKey, RigFile};
-use muprime_diagnosis::data::Table;
-use muprime_diagnosis::fit::{Member, Problem};
+use models::{Condition, Direction, Pass, PeakToPeak};
+use muprime_diagnosis::Table;
+use muprime_diagnosis::regression::fit::{Member, Problem};
 use std::sync::Arc;
 
 /// The forces do not matter for a prior.

@@ -1,13 +1,8 @@
 //! A cause that goes with temperature, and that no effect of the library is, shows as such in the open set.
-use models::condition::Condition;
-use models::pass::Pass;
-use models::quantity::{Direction, PeakToPeak};
-use models::rig_file::RigFile;
-use muprime_diagnosis::data::Table;
-use muprime_diagnosis::decision::Verdict;
-use muprime_diagnosis::hypotheses::Options;
-use muprime_diagnosis::kernel::Coordinates;
-use muprime_diagnosis::verdict::diagnose;
+use models::{Condition, Direction, Pass, PeakToPeak, RigFile};
+use muprime_diagnosis::regression::kernel::Coordinates;
+use muprime_diagnosis::verdict::Verdict;
+use muprime_diagnosis::{Options, Table, diagnose};
 use std::f64::consts::PI;
 
 const RIG: &str = "[finger]\nnormal_stiffness_n_per_m = 3.9e6\nlateral_stiffness_n_per_m = 1.5e6\n\

@@ -1,14 +1,12 @@
 //! Causes in a formula that the library does not have, by tests/peers/third_generator.py (`--seed 36113007`
 //! unless said), which marches a spring-slider over the cycle and shares no code with this project.
 
+use models::RigFile;
 use models::pass::{Pass, read_passes};
-use models::rig_file::RigFile;
-use muprime_diagnosis::data::Table;
-use muprime_diagnosis::decision::Verdict;
-use muprime_diagnosis::document::predictions;
-use muprime_diagnosis::hypotheses::Options;
-use muprime_diagnosis::unstated::Unstated;
-use muprime_diagnosis::verdict::{Hypothesis, Report, diagnose};
+use muprime_diagnosis::report::document::predictions;
+use muprime_diagnosis::report::unstated_covariates::Unstated;
+use muprime_diagnosis::verdict::Verdict;
+use muprime_diagnosis::{Hypothesis, Options, Report, Table, diagnose};
 use rayon::prelude::*;
 use std::path::Path;
 

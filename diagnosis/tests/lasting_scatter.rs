@@ -1,11 +1,9 @@
 //! Friction series cut into passes: noise that lasts is no gap, a law of the load between runs is one, and
 //! structures are described as what they are.
+use models::RigFile;
 use models::pass::read_passes;
-use models::rig_file::RigFile;
-use muprime_diagnosis::data::Table;
-use muprime_diagnosis::decision::Verdict;
-use muprime_diagnosis::hypotheses::Options;
-use muprime_diagnosis::verdict::{Hypothesis, Report, diagnose};
+use muprime_diagnosis::verdict::Verdict;
+use muprime_diagnosis::{Hypothesis, Options, Report, Table, diagnose};
 use std::f64::consts::TAU;
 
 /// What a series is made of: noise that lasts some ten passes, independent noise, and friction over speed

@@ -5,16 +5,14 @@
 //! that a late half is never joined to a new one.
 
 use super::connection::{Connection, LONGEST_SLEEP, Periodic, Spawned};
-use super::ended::Ended;
+use super::link_error::LinkError;
 use super::setup::InstrumentSetup;
 use super::slcan::Slcan;
 use super::socketcan::KernelCan;
 use super::trace::TracedBus;
-use instruments::FrameId;
-use instruments::bus::{CanEvent, CanPort};
-use instruments::codec::can::CanFrame;
 use instruments::profile::{FrameKind, Part};
-use realtime::ports::Nanos;
+use instruments::{CanEvent, CanFrame, CanPort, FrameId};
+use realtime::Nanos;
 use std::convert::Infallible;
 use std::time::{Duration, Instant};
 
@@ -29,7 +27,7 @@ pub(super) const PASSIVE: &str = "the CAN controller is error passive; check cab
 ///
 /// # Errors
 /// Where there is none.
-pub fn open(address: &str, bitrate: u32) -> Result<Box<dyn CanPort>, Ended> {
+pub fn open(address: &str, bitrate: u32) -> Result<Box<dyn CanPort>, LinkError> {
     match address.strip_prefix("slcan:") {
         Some(path) => Ok(Box::new(Slcan::open(path, bitrate)?)),
         None => Ok(Box::new(TracedBus { inner: KernelCan::open(address)?, interface: address.into() })),
@@ -96,7 +94,7 @@ fn converse(
     port: &mut dyn CanPort,
     base: u32,
     rate_hz: Option<f64>,
-) -> Result<Infallible, Ended> {
+) -> Result<Infallible, LinkError> {
     let limit_ms = connection.endpoint.profile().description.link.response_timeout_ms;
     let limit = Duration::from_millis(u64::from(limit_ms));
     let mut groups = groups(connection, base, rate_hz);
@@ -106,7 +104,7 @@ fn converse(
     let mut heard = Instant::now();
     loop {
         if connection.stopping() {
-            return Err(Ended::Stopped);
+            return Err(LinkError::Stopped);
         }
         let now = connection.now();
         for group in &mut groups {
@@ -121,12 +119,12 @@ fn converse(
                 periodic.advance(now);
             }
             if group.requested_at.is_some_and(|since| since.elapsed() > limit) {
-                return Err(Ended::Timeout(limit_ms));
+                return Err(LinkError::Timeout(limit_ms));
             }
         }
         let silence = limit.max(LONGEST_SLEEP) * 5;
         if heard.elapsed() > silence {
-            return Err(Ended::Timeout(u32::try_from(silence.as_millis()).unwrap_or(u32::MAX)));
+            return Err(LinkError::Timeout(u32::try_from(silence.as_millis()).unwrap_or(u32::MAX)));
         }
         let open = groups.iter().filter(|group| group.requested_at.is_none());
         let next = open.filter_map(|group| group.request.as_ref()).map(|(_, periodic)| periodic.due).min();
@@ -135,8 +133,8 @@ fn converse(
         });
         match port.receive(Instant::now() + pause)? {
             None | Some(CanEvent::Other) => {}
-            Some(CanEvent::BusOff) => return Err(Ended::Io(LEFT.into())),
-            Some(CanEvent::Passive) => return Err(Ended::Io(PASSIVE.into())),
+            Some(CanEvent::BusOff) => return Err(LinkError::Io(LEFT.into())),
+            Some(CanEvent::Passive) => return Err(LinkError::Io(PASSIVE.into())),
             Some(CanEvent::Warning) => connection.endpoint.health().problem(WARNS),
             Some(CanEvent::Frame(frame, ago)) => {
                 let ago = Nanos(u64::try_from(ago.as_nanos()).unwrap_or(0));
@@ -184,8 +182,8 @@ impl Group {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::ended::Closed;
     use crate::endpoint::Endpoint;
+    use crate::link_error::Closed;
     use crate::setup::AxisSetup;
     use realtime::ports::{ForceSensor, NoData};
     use std::collections::VecDeque;

@@ -6,15 +6,12 @@
 
 use super::can::{self, LEFT, PASSIVE, WARNS};
 use super::connection::{Connection, LONGEST_SLEEP, Periodic, Spawned};
-use super::ended::Ended;
 use super::endpoint::{BadFrame, Due};
+use super::link_error::LinkError;
 use super::off::{self, OFF_ANSWER_MS, OffWay};
 use super::setup::InstrumentSetup;
-use instruments::bus::{CanEvent, CanPort};
-use instruments::codec::can::CanFrame;
 use instruments::codec::canopen::{self, DriveState, SdoAnswer};
-use instruments::profile::FrameKind;
-use instruments::{FrameId, SetId, SignalId};
+use instruments::{CanEvent, CanFrame, CanPort, FrameId, FrameKind, SetId, SignalId};
 use std::convert::Infallible;
 use std::time::{Duration, Instant};
 
@@ -29,13 +26,13 @@ pub(crate) fn spawn(instrument: &InstrumentSetup, connection: Connection) -> Spa
     let address = instrument.address.clone();
     let node = instrument.base.or(link.node.map(u32::from)).unwrap_or(1);
     let node = u8::try_from(node).ok().filter(|node| (1..=127).contains(node));
-    let node = node.ok_or_else(|| Ended::Io("CANopen has the nodes 1 to 127: correct `base`".into()))?;
+    let node = node.ok_or_else(|| LinkError::Io("CANopen has the nodes 1 to 127: correct `base`".into()))?;
     connection.spawn(move |connection| {
         let port = can::open(&address, link.bitrate.unwrap_or(1_000_000))?;
         let health = connection.endpoint.health();
         health.count(&health.connections);
-        let map =
-            Map::of(connection, node).ok_or_else(|| Ended::Io("the profile is no CiA 402 drive's".into()))?;
+        let map = Map::of(connection, node)
+            .ok_or_else(|| LinkError::Io("the profile is no CiA 402 drive's".into()))?;
         let block = vec![0; map.length];
         let limit_ms = link.response_timeout_ms;
         let mut master = Master { port, node, limit_ms, map, block, tries: 0 };
@@ -81,23 +78,23 @@ struct Master {
 }
 
 impl Master {
-    fn send(&mut self, frame: &CanFrame) -> Result<(), Ended> {
+    fn send(&mut self, frame: &CanFrame) -> Result<(), LinkError> {
         if self.port.send(frame)? {
             Ok(())
         } else {
-            Err(Ended::Io("the bus takes no frames (nobody acknowledges?)".into()))
+            Err(LinkError::Io("the bus takes no frames (nobody acknowledges?)".into()))
         }
     }
 
     /// The next event. A frame of 29 bits is none of CANopen's, whatever its number.
-    fn receive(&mut self, deadline: Instant) -> Result<Option<CanEvent>, Ended> {
+    fn receive(&mut self, deadline: Instant) -> Result<Option<CanEvent>, LinkError> {
         Ok(match self.port.receive(deadline)? {
             Some(CanEvent::Frame(frame, _)) if frame.extended => Some(CanEvent::Other),
             event => event,
         })
     }
 
-    fn sdo(&mut self, request: &CanFrame, index: u16, sub: u8) -> Result<SdoAnswer, Ended> {
+    fn sdo(&mut self, request: &CanFrame, index: u16, sub: u8) -> Result<SdoAnswer, LinkError> {
         self.send(request)?;
         let deadline = Instant::now() + Duration::from_millis(u64::from(self.limit_ms));
         while let Some(event) = self.receive(deadline)? {
@@ -107,38 +104,40 @@ impl Master {
                         return Ok(answer);
                     }
                 }
-                CanEvent::BusOff => return Err(Ended::Io("the controller left the bus (bus-off)".into())),
-                CanEvent::Passive => return Err(Ended::Io(PASSIVE.into())),
+                CanEvent::BusOff => {
+                    return Err(LinkError::Io("the controller left the bus (bus-off)".into()));
+                }
+                CanEvent::Passive => return Err(LinkError::Io(PASSIVE.into())),
                 CanEvent::Warning | CanEvent::Other => {}
             }
             if Instant::now() >= deadline {
                 break;
             }
         }
-        Err(Ended::Timeout(self.limit_ms))
+        Err(LinkError::Timeout(self.limit_ms))
     }
 
-    fn read(&mut self, index: u16, sub: u8) -> Result<u32, Ended> {
+    fn read(&mut self, index: u16, sub: u8) -> Result<u32, LinkError> {
         match self.sdo(&canopen::sdo_read(self.node, index, sub), index, sub)? {
             SdoAnswer::Value(value) => Ok(value),
-            other => Err(Ended::Refused(format!("object {index:#06x}:{sub} cannot be read: {other:x?}"))),
+            other => Err(LinkError::Refused(format!("object {index:#06x}:{sub} cannot be read: {other:x?}"))),
         }
     }
 
-    fn write(&mut self, index: u16, sub: u8, bytes: u8, value: i64) -> Result<(), Ended> {
+    fn write(&mut self, index: u16, sub: u8, bytes: u8, value: i64) -> Result<(), LinkError> {
         match self.sdo(&canopen::sdo_write(self.node, index, sub, bytes, value), index, sub)? {
             SdoAnswer::Written => Ok(()),
-            other => {
-                Err(Ended::Refused(format!("object {index:#06x}:{sub} cannot be set to {value}: {other:x?}")))
-            }
+            other => Err(LinkError::Refused(format!(
+                "object {index:#06x}:{sub} cannot be set to {value}: {other:x?}"
+            ))),
         }
     }
 
-    fn set_up(&mut self, connection: &mut Connection) -> Result<(), Ended> {
+    fn set_up(&mut self, connection: &mut Connection) -> Result<(), LinkError> {
         let kind = self.read(0x1000, 0)?;
         if kind & 0xFFFF != PROFILE_402 {
             let problem = format!("node {} is not a drive of CiA 402 (device type {kind:#010x})", self.node);
-            return Err(Ended::Frame(BadFrame::WrongInstrument(problem)));
+            return Err(LinkError::Frame(BadFrame::WrongInstrument(problem)));
         }
         let status = self.read(0x6041, 0)?;
         let faulted = u16::try_from(status & 0xFFFF).ok().and_then(DriveState::of) == Some(DriveState::Fault);
@@ -154,12 +153,12 @@ impl Master {
         }
         let mode = self.read(0x6061, 0)?;
         if mode != 3 {
-            return Err(Ended::Refused(format!("the drive shows mode {mode}, not 3 (profile velocity)")));
+            return Err(LinkError::Refused(format!("the drive shows mode {mode}, not 3 (profile velocity)")));
         }
         self.send(&canopen::start(self.node))
     }
 
-    fn go_on(&mut self, connection: &mut Connection, heartbeat: Duration) -> Result<Infallible, Ended> {
+    fn go_on(&mut self, connection: &mut Connection, heartbeat: Duration) -> Result<Infallible, LinkError> {
         let mut write = Periodic::new(self.map.rate_hz, connection.now());
         let mut alive = Instant::now();
         loop {
@@ -167,7 +166,7 @@ impl Master {
                 return Err(off::at_the_end(connection, self));
             }
             if alive.elapsed() > heartbeat {
-                return Err(Ended::Io(format!("node {} gives no sign of life", self.node)));
+                return Err(LinkError::Io(format!("node {} gives no sign of life", self.node)));
             }
             let now = connection.now();
             if write.is_due(now) {
@@ -194,7 +193,7 @@ impl Master {
                 Some(CanEvent::Frame(frame, _)) if frame.id == 0x700 + u32::from(self.node) => {
                     alive = Instant::now();
                     if frame.data() == [0] {
-                        return Err(Ended::Io("the drive restarted".into()));
+                        return Err(LinkError::Io("the drive restarted".into()));
                     }
                 }
                 Some(CanEvent::Frame(frame, _)) if frame.id == 0x80 + u32::from(self.node) => {
@@ -202,8 +201,8 @@ impl Master {
                     let code = word.fold(0_u32, |sum, byte| sum << 8 | u32::from(*byte));
                     connection.endpoint.alarm(&format!("emergency {code:#06x}"));
                 }
-                Some(CanEvent::BusOff) => return Err(Ended::Io(LEFT.into())),
-                Some(CanEvent::Passive) => return Err(Ended::Io(PASSIVE.into())),
+                Some(CanEvent::BusOff) => return Err(LinkError::Io(LEFT.into())),
+                Some(CanEvent::Passive) => return Err(LinkError::Io(PASSIVE.into())),
                 Some(CanEvent::Warning) => connection.endpoint.health().problem(WARNS),
                 _ => {}
             }
@@ -215,19 +214,19 @@ impl Master {
         connection: &Connection,
         control: u16,
         set_points: &[(SetId, f64)],
-    ) -> Result<(), Ended> {
+    ) -> Result<(), LinkError> {
         for (set, value) in set_points {
             let _ = connection.endpoint.profile().encode_set(*set, *value, &mut self.block);
         }
         self.block[..2].copy_from_slice(&control.to_le_bytes());
         let frame = CanFrame::new(self.map.out, &self.block);
-        let none = || Ended::Io("its set-points are more than the 8 bytes of a frame".into());
+        let none = || LinkError::Io("its set-points are more than the 8 bytes of a frame".into());
         self.send(&frame.ok_or_else(none)?)
     }
 }
 
 impl OffWay for Master {
-    fn send_off(&mut self, connection: &mut Connection) -> Result<(), Ended> {
+    fn send_off(&mut self, connection: &mut Connection) -> Result<(), LinkError> {
         let safe = connection.endpoint.hand_out_off(connection.now());
         let sent = self.process_data(connection, NOT_ENABLED, &safe);
         self.tries += 1;
@@ -239,7 +238,9 @@ impl OffWay for Master {
             Ok(())
         };
         match (sent, served) {
-            (Ok(()), Ok(()) | Err(Ended::Refused(_) | Ended::Timeout(_))) | (Err(_), Ok(())) => Ok(()),
+            (Ok(()), Ok(()) | Err(LinkError::Refused(_) | LinkError::Timeout(_))) | (Err(_), Ok(())) => {
+                Ok(())
+            }
             (Err(ended), _) | (Ok(()), Err(ended)) => Err(ended),
         }
     }
@@ -248,7 +249,7 @@ impl OffWay for Master {
         self.limit_ms = self.limit_ms.max(OFF_ANSWER_MS);
     }
 
-    fn read_state(&mut self, connection: &mut Connection) -> Result<(), Ended> {
+    fn read_state(&mut self, connection: &mut Connection) -> Result<(), LinkError> {
         let deadline = Instant::now() + Duration::from_millis(u64::from(self.limit_ms));
         while let Some(event) = self.receive(deadline)? {
             if let CanEvent::Frame(frame, _) = event
@@ -345,7 +346,7 @@ mod tests {
     fn a_node_beyond_127_is_refused() {
         for base in [0, 128, 300] {
             let refused = spawn(&InstrumentSetup { base: Some(base), ..stage() }, connection());
-            assert!(matches!(refused, Err(Ended::Io(why)) if why.contains("1 to 127")), "{base}");
+            assert!(matches!(refused, Err(LinkError::Io(why)) if why.contains("1 to 127")), "{base}");
         }
     }
 

@@ -7,10 +7,10 @@
 use super::endpoint::BadFrame;
 use super::modbus::{Blocks, Registers, Trouble};
 use super::modbus_tcp::{Tcp, resolve};
-use super::{Ended, InstrumentSetup, OpenError};
+use super::{InstrumentSetup, LinkError, OpenError};
 use instruments::Profile;
 use instruments::schema::{LinkKind, Role};
-use realtime::clock::Clock;
+use realtime::Clock;
 use std::net::SocketAddr;
 use std::sync::atomic::{AtomicBool, Ordering};
 use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
@@ -132,7 +132,7 @@ struct Talk {
 }
 
 impl Talk {
-    fn connect<'a>(&self, runtime: (&'a Runtime, &'a Clock)) -> Result<Tcp<'a>, Ended> {
+    fn connect<'a>(&self, runtime: (&'a Runtime, &'a Clock)) -> Result<Tcp<'a>, LinkError> {
         let link = &self.profile.description.link;
         Tcp::connect(runtime, self.address, self.unit, link.connect_timeout_ms, link.response_timeout_ms)
     }
@@ -159,7 +159,7 @@ impl Talk {
     }
 
     /// Writes the set-points that are new, and reads everything.
-    fn look(&mut self, wire: &mut Tcp<'_>, set: &[Option<f64>; 3]) -> Result<Air, Ended> {
+    fn look(&mut self, wire: &mut Tcp<'_>, set: &[Option<f64>; 3]) -> Result<Air, LinkError> {
         let mut problem = None;
         for (index, value) in set.iter().enumerate() {
             let (Some(value), Some(id)) = (value, self.profile.set(QUANTITIES[index])) else { continue };
@@ -173,20 +173,20 @@ impl Talk {
                 Err(Trouble::Refused(why) | Trouble::Corrupt(why)) => {
                     problem = Some(format!("{} {value} was refused: {why}", QUANTITIES[index]));
                 }
-                Err(Trouble::Ended(ended)) => return Err(ended),
+                Err(Trouble::LinkError(ended)) => return Err(ended),
             }
         }
         let readings = self.read(wire)?;
         Ok(Air { readings, problem })
     }
 
-    fn read(&self, wire: &mut Tcp<'_>) -> Result<[Option<(f64, Instant)>; 3], Ended> {
+    fn read(&self, wire: &mut Tcp<'_>) -> Result<[Option<(f64, Instant)>; 3], LinkError> {
         let mut values = self.profile.values();
         for (frame, poll) in self.profile.polls() {
             let mut bytes = Vec::new();
             for span in &self.profile.frames()[frame.0].spans {
                 let part = wire.read(poll.table, span.address, span.count);
-                bytes.extend(part.map_err(|trouble| Ended::Io(format!("{trouble:?}")))?);
+                bytes.extend(part.map_err(|trouble| LinkError::Io(format!("{trouble:?}")))?);
             }
             let decoded = self.profile.decode(frame, &bytes, &mut values);
             decoded.map_err(|error| BadFrame::Corrupt(error.to_string()))?;

@@ -5,8 +5,8 @@
 //! first connection goes to whoever opened the rig. After a stop it ends once 'off' is read back, or
 //! `OFF_WITHIN` is over.
 
-use super::ended::{Closed, Ended, OFF_WITHIN};
 use super::endpoint::Endpoint;
+use super::link_error::{Closed, LinkError, OFF_WITHIN};
 use super::off::PendingOff;
 use realtime::clock::{Clock, Participant};
 use realtime::pacing::panic_message;
@@ -53,7 +53,7 @@ impl Periodic {
 }
 
 /// The thread of a connection, or why the instrument could not be opened.
-pub type Spawned = Result<JoinHandle<Closed>, Ended>;
+pub type Spawned = Result<JoinHandle<Closed>, LinkError>;
 
 /// What every transport's thread starts from.
 pub struct Connection {
@@ -66,7 +66,7 @@ pub struct Connection {
     /// Whether an 'off' is pending.
     pub pending_off: PendingOff,
     /// Takes the outcome of the first connection, once.
-    pub ready: Option<SyncSender<Result<(), Ended>>>,
+    pub ready: Option<SyncSender<Result<(), LinkError>>>,
     /// When the thread is to be done with switching off; known from the moment that it sees `stop`.
     off_by: Option<Nanos>,
 }
@@ -77,7 +77,7 @@ impl Connection {
         endpoint: Endpoint,
         clock: impl Into<Clock>,
         stop: Arc<AtomicBool>,
-        ready: SyncSender<Result<(), Ended>>,
+        ready: SyncSender<Result<(), LinkError>>,
     ) -> Self {
         let clock = clock.into();
         let pending_off = endpoint.pending_off(&stop, &clock);
@@ -101,7 +101,7 @@ impl Connection {
     }
 
     /// Tells whoever opened the rig how the first connection went. Returns whether it was the first.
-    pub fn tell(&mut self, outcome: Result<(), Ended>) -> bool {
+    pub fn tell(&mut self, outcome: Result<(), LinkError>) -> bool {
         self.ready.take().map(|ready| ready.send(outcome)).is_some()
     }
 
@@ -122,16 +122,19 @@ impl Connection {
     /// Where no thread can be had.
     pub fn spawn(
         mut self,
-        mut converse: impl FnMut(&mut Connection) -> Result<Infallible, Ended> + Send + 'static,
+        mut converse: impl FnMut(&mut Connection) -> Result<Infallible, LinkError> + Send + 'static,
     ) -> Spawned {
         let name: String = self.endpoint.profile().id().chars().take(15).collect();
         // At the level of the terminal's default, so that what is shown has its instrument.
         let span = tracing::warn_span!("instrument", id = self.endpoint.profile().id());
         let run = move || span.in_scope(|| self.keep_up(&mut converse));
-        std::thread::Builder::new().name(name).spawn(run).map_err(Ended::from)
+        std::thread::Builder::new().name(name).spawn(run).map_err(LinkError::from)
     }
 
-    fn keep_up(&mut self, converse: &mut dyn FnMut(&mut Connection) -> Result<Infallible, Ended>) -> Closed {
+    fn keep_up(
+        &mut self,
+        converse: &mut dyn FnMut(&mut Connection) -> Result<Infallible, LinkError>,
+    ) -> Closed {
         let link = &self.endpoint.profile().description.link;
         let first = Duration::from_millis(u64::from(link.backoff_first_ms));
         let longest = Duration::from_millis(u64::from(link.backoff_longest_ms));
@@ -141,7 +144,7 @@ impl Connection {
         while !self.stopping() || (self.endpoint.owes_off() && !self.off_time_over()) {
             let samples_before = health.report().samples;
             let ended = self.guarded(converse);
-            let stopped = matches!(ended, Ended::Stopped);
+            let stopped = matches!(ended, LinkError::Stopped);
             let off = self.endpoint.reads_off();
             self.endpoint.link_down(NoData::Disconnected);
             if stopped {
@@ -151,7 +154,7 @@ impl Connection {
                     self.closed("stopped before a state came".into())
                 };
             }
-            if matches!(ended, Ended::Timeout(_) | Ended::Cut(_)) {
+            if matches!(ended, LinkError::Timeout(_) | LinkError::Cut(_)) {
                 health.count(&health.timeouts);
             }
             last_words = ended.to_string();
@@ -183,11 +186,14 @@ impl Connection {
     }
 
     /// One conversation. A panic in it is the end of it, and of nothing else: the next one switches off.
-    fn guarded(&mut self, converse: &mut dyn FnMut(&mut Connection) -> Result<Infallible, Ended>) -> Ended {
+    fn guarded(
+        &mut self,
+        converse: &mut dyn FnMut(&mut Connection) -> Result<Infallible, LinkError>,
+    ) -> LinkError {
         match std::panic::catch_unwind(AssertUnwindSafe(|| converse(self))) {
             Ok(Ok(never)) => match never {},
             Ok(Err(ended)) => ended,
-            Err(cause) => Ended::Panicked(panic_message(&*cause)),
+            Err(cause) => LinkError::Panicked(panic_message(&*cause)),
         }
     }
 

@@ -10,14 +10,14 @@ use super::health::Health;
 use super::mailbox::Mailbox;
 use super::ports::{self, AmplifierPort, ContactsPort, ForcePort, SetPoint, StagePort, States, SupplyPort};
 use super::setup::{AxisSetup, CONTACTS, InstrumentSetup, SetupError};
-use super::timebase::{Counter, DeviceClock, Step};
+use super::timebase::{Counter, CounterStep, DeviceClock};
 use instruments::schema::{Severity, Stamp};
 use instruments::{FrameId, Profile, SetId, SignalId, Values};
-use models::quantity::PeakToPeak;
+use models::PeakToPeak;
 pub use orders::Due;
 use orders::Orders;
 use realtime::ports::{
-    AmplifierState, Contact, Contacts, Forces, Nanos, NoData, Sample, StageState, SupplyState,
+    AmplifierState, Contacts, Forces, Nanos, NoData, SafetyContact, Sample, StageState, SupplyState,
 };
 use ringbuf::HeapProd;
 use ringbuf::traits::Producer;
@@ -113,7 +113,7 @@ impl ContactsLink {
         let mut touched = false;
         for (signal, contact) in self.signals.iter().zip(contact) {
             if let Some(signal) = signal.filter(|signal| view.holds(*signal)) {
-                *contact = view.channel(signal).map(|reading| Contact {
+                *contact = view.channel(signal).map(|reading| SafetyContact {
                     closed: reading.value != 0.0,
                     taken_at: reading.taken_at,
                     sequence: reading.sequence,
@@ -379,14 +379,18 @@ impl Endpoint {
         if let Some((signal, counter)) = &mut time.counter {
             let count = self.values.get(*signal).max(0.0) as u64;
             match counter.step(count) {
-                Step::New { lost } => {
+                CounterStep::New { lost } => {
                     health.lost_samples.fetch_add(lost, std::sync::atomic::Ordering::Relaxed);
                 }
-                old @ (Step::Same | Step::Old) => {
-                    health.count(if old == Step::Same { &health.repeats } else { &health.out_of_order });
+                old @ (CounterStep::Same | CounterStep::Old) => {
+                    health.count(if old == CounterStep::Same {
+                        &health.repeats
+                    } else {
+                        &health.out_of_order
+                    });
                     return None;
                 }
-                Step::Reset => health.count(&health.clock_resets),
+                CounterStep::Reset => health.count(&health.clock_resets),
             }
             {
                 time.counted = count as u32;

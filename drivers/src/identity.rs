@@ -3,7 +3,7 @@
 use super::OpenError;
 use super::modbus_tcp::resolve;
 use super::setup::{InstrumentSetup, InstrumentsSetup};
-use instruments::schema::LinkKind;
+use instruments::LinkKind;
 use std::collections::BTreeSet;
 use std::net::{IpAddr, Ipv4Addr, SocketAddr, UdpSocket};
 

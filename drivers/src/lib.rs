@@ -43,9 +43,9 @@
 //! | [`health`] | what a link counts |
 //! | [`identity`] | which instrument an address means, however it is spelt |
 //! | [`bundled`] | the profiles that come with the program |
-//! | [`library`] | profiles from files and folders |
+//! | [`user_profiles`] | profiles from files and folders |
 //! | [`mailbox`] | the newest command on its way from the loop to a link |
-//! | [`ended`] | why a conversation ended, and how its link was closed |
+//! | [`link_error`] | why a conversation ended, and how its link was closed |
 //! | [`connection`] | the life of a link: connect, converse, back off |
 //! | [`off`] | how an instrument is switched off and read back, whatever the wire |
 //! | [`modbus`] | the conversation with registers, over [`modbus_tcp`] or [`modbus_rtu`] |
@@ -68,11 +68,10 @@ pub mod can;
 pub mod canopen;
 pub mod chamber;
 pub mod connection;
-pub mod ended;
 pub mod endpoint;
 pub mod health;
 pub mod identity;
-pub mod library;
+pub mod link_error;
 pub mod mailbox;
 pub mod modbus;
 pub mod modbus_rtu;
@@ -94,17 +93,17 @@ pub mod text;
 pub mod timebase;
 pub mod trace;
 pub mod transport;
+pub mod user_profiles;
 pub mod vibrometer;
 
-pub use ended::{Closed, Ended};
 pub use health::{Health, HealthReport};
+pub use link_error::{Closed, LinkError};
 pub use setup::{AxisSetup, InstrumentSetup, InstrumentsSetup, SetupError};
 
 use connection::Connection;
 use endpoint::Endpoint;
-use instruments::Profile;
-use instruments::schema::LinkKind;
-use realtime::clock::Clock;
+use instruments::{LinkKind, Profile};
+use realtime::Clock;
 use realtime::ports::{Absent, Amplifier, ForceSensor, SafetyInputs, Stage, SupplySwitch};
 use std::sync::Arc;
 use std::sync::atomic::{AtomicBool, Ordering};
@@ -135,7 +134,7 @@ pub enum OpenError {
     )]
     UnknownProfile { id: String, known: String, looked: String },
     #[error("{}: {problem}", file.display())]
-    Unreadable { file: std::path::PathBuf, problem: library::FileError },
+    Unreadable { file: std::path::PathBuf, problem: user_profiles::FileError },
     #[error("two profiles are called `{id}`: {places}; {remedy}")]
     Ambiguous { id: String, places: String, remedy: String },
     #[error("profile `{id}`: {error}")]
@@ -144,10 +143,10 @@ pub enum OpenError {
     Mismatch { id: String, address: String, problem: SetupError },
     /// The instrument did not answer, or is not what the profile says.
     #[error("instrument `{id}` at {address}: {problem}")]
-    Link { id: String, address: String, problem: Ended },
+    Link { id: String, address: String, problem: LinkError },
     /// The same of an instrument beside the loop.
     #[error("`{id}` at {address}: {problem}")]
-    Beside { id: String, address: String, problem: Ended },
+    Beside { id: String, address: String, problem: LinkError },
     /// The profile is not that of a chamber or of a vibrometer's controller; what it lacks.
     #[error("profile `{0}`{1}")]
     Unfit(String, &'static str),
@@ -155,7 +154,7 @@ pub enum OpenError {
 
 /// What an instrument is to the rig.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub enum Role {
+pub enum PortRole {
     /// It measures forces.
     Force,
     /// It drives the plate.
@@ -168,7 +167,7 @@ pub enum Role {
     Contacts,
 }
 
-impl Role {
+impl PortRole {
     /// Whether it takes no set-points.
     pub const fn only_measures(self) -> bool {
         matches!(self, Self::Force | Self::Contacts)
@@ -181,7 +180,7 @@ pub struct LinkEnd {
     /// Id of the instrument's profile.
     pub name: String,
     /// What it is to the rig.
-    pub role: Role,
+    pub role: PortRole,
     /// Whether it was read back off.
     pub closed: Closed,
 }
@@ -196,7 +195,7 @@ pub struct Links {
 
 struct Link {
     name: String,
-    role: Role,
+    role: PortRole,
     health: Arc<Health>,
     thread: Option<JoinHandle<Closed>>,
 }
@@ -325,7 +324,7 @@ fn start<Port>(
     }
     .map_err(failed)?;
     links.links.push(Link { name: instrument.profile.clone(), role, health, thread: Some(thread) });
-    opened.recv().unwrap_or(Err(Ended::Unopened)).map_err(failed)?;
+    opened.recv().unwrap_or(Err(LinkError::Unopened)).map_err(failed)?;
     Ok(port)
 }
 

@@ -5,7 +5,7 @@
 //! and stays noted until the link has seen it. Nothing here blocks, locks or allocates after it was made.
 
 use crossbeam_queue::ArrayQueue;
-use realtime::ports::Nanos;
+use realtime::Nanos;
 use std::sync::Arc;
 use std::sync::atomic::{AtomicBool, AtomicU64, Ordering};
 

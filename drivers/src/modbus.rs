@@ -1,8 +1,8 @@
 //! The conversation with an instrument of registers, whatever carries it.
 
 use super::connection::{Connection, Periodic};
-use super::ended::{BAD_IN_A_ROW, Ended};
 use super::endpoint::Due;
+use super::link_error::{BAD_IN_A_ROW, LinkError};
 use super::off::{self, OFF_ANSWER_MS, OffWay};
 use instruments::profile::{Profile, Span};
 use instruments::schema::{Poll, Table, Write};
@@ -17,7 +17,7 @@ pub enum Trouble {
     /// The answer did not pass its checks; the line is clear again.
     Corrupt(String),
     /// The connection is of no more use.
-    Ended(Ended),
+    LinkError(LinkError),
 }
 
 /// Registers at the other end of a wire. What may go wrong with them: [`Trouble`].
@@ -86,7 +86,7 @@ impl<'a> Conversation<'a> {
     ///
     /// # Errors
     /// Why the connection is of no use.
-    pub fn begin(connection: &mut Connection, wire: &'a mut dyn Registers) -> Result<Self, Ended> {
+    pub fn begin(connection: &mut Connection, wire: &'a mut dyn Registers) -> Result<Self, LinkError> {
         let mut conversation = Self { wire, blocks: Blocks::of(connection.endpoint.profile()), bad: 0 };
         off::at_the_beginning(connection, &mut conversation)?;
         let set_up = connection.endpoint.profile().description.init.is_empty();
@@ -106,7 +106,11 @@ impl<'a> Conversation<'a> {
     ///
     /// # Errors
     /// Always: why it ended.
-    pub fn go_on(mut self, connection: &mut Connection, rate_hz: Option<f64>) -> Result<Infallible, Ended> {
+    pub fn go_on(
+        mut self,
+        connection: &mut Connection,
+        rate_hz: Option<f64>,
+    ) -> Result<Infallible, LinkError> {
         connection.tell(Ok(()));
         let now = connection.now();
         let often = |(frame, poll): (FrameId, Poll)| {
@@ -142,7 +146,7 @@ impl<'a> Conversation<'a> {
         }
     }
 
-    fn read(&mut self, connection: &mut Connection, frame: FrameId, poll: &Poll) -> Result<(), Ended> {
+    fn read(&mut self, connection: &mut Connection, frame: FrameId, poll: &Poll) -> Result<(), LinkError> {
         // The first read that brings nothing ends the sample.
         let spans = connection.endpoint.profile().frames()[frame.0].spans.clone();
         let read = |span: &Span| self.wire.read(poll.table, span.address, span.count);
@@ -157,7 +161,7 @@ impl<'a> Conversation<'a> {
     }
 
     /// Sends the loop's command in one piece. One that is not taken is followed by an 'off' at once.
-    fn command(&mut self, connection: &mut Connection, set_points: &[(SetId, f64)]) -> Result<(), Ended> {
+    fn command(&mut self, connection: &mut Connection, set_points: &[(SetId, f64)]) -> Result<(), LinkError> {
         let answer = self.write(connection, set_points);
         if self.judge(connection, answer)?.is_none() {
             connection.endpoint.refused();
@@ -171,7 +175,7 @@ impl<'a> Conversation<'a> {
         let mut outcome = Ok(());
         for (block, registers) in self.blocks.put(connection.endpoint.profile(), set_points) {
             match self.wire.write(block.table, block.address, &registers) {
-                Err(Trouble::Ended(ended)) => return Err(Trouble::Ended(ended)),
+                Err(Trouble::LinkError(ended)) => return Err(Trouble::LinkError(ended)),
                 written => outcome = outcome.and(written),
             }
         }
@@ -179,32 +183,36 @@ impl<'a> Conversation<'a> {
     }
 
     /// Tells 'the instrument refused' from 'we could not talk'. A few bad answers are borne.
-    fn judge<T>(&mut self, connection: &Connection, answer: Result<T, Trouble>) -> Result<Option<T>, Ended> {
+    fn judge<T>(
+        &mut self,
+        connection: &Connection,
+        answer: Result<T, Trouble>,
+    ) -> Result<Option<T>, LinkError> {
         let health = connection.endpoint.health();
         let ended = match answer {
             Ok(value) => {
                 self.bad = 0;
                 return Ok(Some(value));
             }
-            Err(Trouble::Ended(ended)) => return Err(ended),
+            Err(Trouble::LinkError(ended)) => return Err(ended),
             Err(Trouble::Refused(problem)) => {
                 health.count(&health.exceptions);
-                Ended::Refused(problem)
+                LinkError::Refused(problem)
             }
             Err(Trouble::Corrupt(problem)) => {
                 health.count(&health.corrupt_frames);
-                Ended::Corrupt(problem)
+                LinkError::Corrupt(problem)
             }
         };
         health.problem(ended.to_string());
         self.bad += 1;
         // Before the first sample there is nothing to bear with a refusal: the map is wrong.
-        let hopeless = connection.is_first() && matches!(ended, Ended::Refused(_));
+        let hopeless = connection.is_first() && matches!(ended, LinkError::Refused(_));
         if self.bad >= BAD_IN_A_ROW || hopeless { Err(ended) } else { Ok(None) }
     }
 
     /// What the profile wants done before the samples count, once the signature is known to hold.
-    fn initialise(&mut self, connection: &Connection) -> Result<(), Ended> {
+    fn initialise(&mut self, connection: &Connection) -> Result<(), LinkError> {
         for init in &connection.endpoint.profile().description.init {
             let done = match (init.function, init.copy, &init.registers) {
                 (Some((function, data)), ..) => self.wire.own_function(function, data),
@@ -217,9 +225,9 @@ impl<'a> Conversation<'a> {
             };
             match done {
                 Ok(()) => {}
-                Err(Trouble::Ended(ended)) => return Err(ended),
+                Err(Trouble::LinkError(ended)) => return Err(ended),
                 Err(Trouble::Refused(problem) | Trouble::Corrupt(problem)) => {
-                    return Err(Ended::Refused(format!("{}: {problem}", init.text)));
+                    return Err(LinkError::Refused(format!("{}: {problem}", init.text)));
                 }
             }
         }
@@ -232,11 +240,11 @@ fn words(block: &[u8]) -> Vec<u16> {
 }
 
 impl OffWay for Conversation<'_> {
-    fn send_off(&mut self, connection: &mut Connection) -> Result<(), Ended> {
+    fn send_off(&mut self, connection: &mut Connection) -> Result<(), LinkError> {
         let safe = connection.endpoint.hand_out_off(connection.now());
         let health = connection.endpoint.health();
         let mut not_taken = |trouble: Trouble| match trouble {
-            Trouble::Ended(ended) => Err(ended),
+            Trouble::LinkError(ended) => Err(ended),
             Trouble::Refused(problem) | Trouble::Corrupt(problem) => {
                 health.count(&health.exceptions);
                 health.problem(format!("'off' was not taken: {problem}"));
@@ -266,7 +274,7 @@ impl OffWay for Conversation<'_> {
         self.wire.wait_up_to(limit.max(OFF_ANSWER_MS));
     }
 
-    fn read_state(&mut self, connection: &mut Connection) -> Result<(), Ended> {
+    fn read_state(&mut self, connection: &mut Connection) -> Result<(), LinkError> {
         let mut regular = polls(connection).into_iter().filter(|(_, poll)| poll.rate_hz.is_some());
         regular.try_for_each(|(frame, poll)| self.read(connection, frame, &poll))
     }

@@ -7,7 +7,7 @@
 //! nothing holds up an 'off'.
 
 use super::connection::{Connection, Spawned};
-use super::ended::{BAD_IN_A_ROW, Ended};
+use super::link_error::{BAD_IN_A_ROW, LinkError};
 use super::modbus::{Blocks, Conversation, Registers, Trouble};
 use super::off::{OFF_WAITS_MS, PendingOff};
 use super::serial::{Line, SharedLine};
@@ -74,14 +74,14 @@ impl Rtu {
     ///
     /// # Errors
     /// Where the port is not there, is in use, or the format makes no sense.
-    pub fn open(path: &str, baud: u32, format: &str, unit: u8, answer_ms: u32) -> Result<Self, Ended> {
+    pub fn open(path: &str, baud: u32, format: &str, unit: u8, answer_ms: u32) -> Result<Self, LinkError> {
         let line = SharedLine::open(path, baud, format)?;
         let (silence, pending_off) = (rtu::silence_s(baud), PendingOff::default());
         Ok(Rtu { line, unit, answer_ms, quiet_ms: answer_ms, silence, pending_off })
     }
 
     /// Writes the safe set-points, every block of them, and needs no answer. The 'off' that is answered and read back follows.
-    fn send_unanswered_off(&mut self, connection: &Connection) -> Result<(), Ended> {
+    fn send_unanswered_off(&mut self, connection: &Connection) -> Result<(), LinkError> {
         let profile = connection.endpoint.profile();
         let off = Blocks::of(profile).put(profile, &connection.endpoint.safe_set_points());
         for (n, (block, words)) in off.iter().enumerate() {
@@ -110,8 +110,8 @@ impl Rtu {
                 let count = line.read(&mut buffer, pending_off.look(&mut deadline))?;
                 if count == 0 && Instant::now() >= deadline {
                     return Err(match answer.len() {
-                        0 => Ended::Timeout(pending_off.limit_ms(answer_ms)),
-                        n => Ended::Cut(format!(
+                        0 => LinkError::Timeout(pending_off.limit_ms(answer_ms)),
+                        n => LinkError::Cut(format!(
                             "{n} bytes came in place of {}: {}: are baud and format right, and `unit` one of its own?",
                             request.answer_length,
                             super::remedy::shown(&answer)
@@ -127,7 +127,7 @@ impl Rtu {
             std::thread::sleep(silence);
             Ok(answer)
         };
-        self.line.with(exchange).map_err(Trouble::Ended)
+        self.line.with(exchange).map_err(Trouble::LinkError)
     }
 
     /// Judges an answer; after a bad one the line is drained, so that its rest is no next answer.
@@ -138,14 +138,14 @@ impl Rtu {
                 let quiet = Duration::from_millis(u64::from(self.quiet_ms));
                 match self.line.with(|line| line.drain(quiet, 10 * quiet, &self.pending_off)) {
                     Ok(_) => Trouble::Corrupt(other.to_string()),
-                    Err(ended) => Trouble::Ended(ended),
+                    Err(ended) => Trouble::LinkError(ended),
                 }
             }
         })
     }
 
     /// Stops a stream by talking into it, until the line falls silent.
-    fn stop_stream(&mut self, stream: &Stream) -> Result<(), Ended> {
+    fn stop_stream(&mut self, stream: &Stream) -> Result<(), LinkError> {
         let Some((byte, count)) = stream.stop else { return Ok(()) };
         for _ in 0..STOP_TRIES {
             self.line.with(|line| line.write(&vec![byte; usize::from(count)]))?;
@@ -154,21 +154,21 @@ impl Rtu {
                 return Ok(());
             }
         }
-        Err(Ended::Io("the instrument's stream cannot be stopped".into()))
+        Err(LinkError::Io("the instrument's stream cannot be stopped".into()))
     }
 
     /// Starts the stream and hands over its frames until something is wrong.
-    fn listen(&mut self, connection: &mut Connection, stream: &Stream) -> Result<Infallible, Ended> {
+    fn listen(&mut self, connection: &mut Connection, stream: &Stream) -> Result<Infallible, LinkError> {
         self.start_stream(stream)?;
         super::stream::listen(connection, stream, false, &mut |buffer, deadline| {
             self.line.with(|line| line.read(buffer, deadline))
         })?;
         self.stop_stream(stream)?;
-        Err(Ended::Stopped)
+        Err(LinkError::Stopped)
     }
 
-    fn start_stream(&mut self, stream: &Stream) -> Result<(), Ended> {
-        let mut last = Ended::Io("the profile says no way to start the stream".into());
+    fn start_stream(&mut self, stream: &Stream) -> Result<(), LinkError> {
+        let mut last = LinkError::Io("the profile says no way to start the stream".into());
         for _ in 0..BAD_IN_A_ROW {
             let started = if let Some((address, value)) = stream.start_register {
                 self.write(Table::Holding, address, &[value])
@@ -179,8 +179,8 @@ impl Rtu {
             };
             match started {
                 Ok(()) => return Ok(()),
-                Err(Trouble::Ended(ended)) => return Err(ended),
-                Err(Trouble::Refused(why) | Trouble::Corrupt(why)) => last = Ended::Refused(why),
+                Err(Trouble::LinkError(ended)) => return Err(ended),
+                Err(Trouble::Refused(why) | Trouble::Corrupt(why)) => last = LinkError::Refused(why),
             }
         }
         Err(last)
@@ -282,7 +282,7 @@ mod tests {
         wire.pending_off.commands.handed_out(true);
         wire.pending_off.stop.store(true, std::sync::atomic::Ordering::Release);
         let read = wire.read(Table::Holding, 0, 2);
-        assert!(matches!(read, Err(Trouble::Ended(Ended::Timeout(OFF_WAITS_MS)))), "{read:?}");
+        assert!(matches!(read, Err(Trouble::LinkError(LinkError::Timeout(OFF_WAITS_MS)))), "{read:?}");
         instrument.write_all(&[2, 3, 4, 0, 0, 0, 0, 0, 0]).unwrap();
         let read = wire.read(Table::Holding, 0, 2);
         assert!(matches!(read, Err(Trouble::Corrupt(_))), "{read:?}");

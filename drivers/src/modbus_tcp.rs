@@ -6,14 +6,13 @@
 //! and made anew. An answer that comes late then finds no socket: it can never become a force.
 
 use super::connection::{Connection, Spawned};
-use super::ended::{AddressError, Ended};
+use super::link_error::{AddressError, LinkError};
 use super::modbus::{Conversation, Registers, Trouble};
 use super::off::{LOOK_EVERY, PendingOff};
 use super::setup::InstrumentSetup;
 use super::trace::Traced;
 use instruments::schema::Table;
-use realtime::clock::Clock;
-use realtime::ports::Nanos;
+use realtime::{Clock, Nanos};
 use std::future::Future;
 use std::net::{SocketAddr, ToSocketAddrs};
 use std::time::Duration;
@@ -62,7 +61,7 @@ fn within<T>(
     (runtime, clock): (&Runtime, &Clock),
     (limit_ms, pending_off): (u32, &PendingOff),
     request: impl Future<Output = T>,
-) -> Result<T, Ended> {
+) -> Result<T, LinkError> {
     let by = |limit_ms: u32| clock.now().plus(Nanos(u64::from(limit_ms) * 1_000_000));
     let mut deadline = by(limit_ms);
     runtime.block_on(async {
@@ -74,7 +73,7 @@ fn within<T>(
                 return Ok(answer);
             }
             if deadline <= clock.now() {
-                return Err(Ended::Timeout(pending_off.limit_ms(limit_ms)));
+                return Err(LinkError::Timeout(pending_off.limit_ms(limit_ms)));
             }
         }
     })
@@ -99,7 +98,7 @@ impl<'a> Tcp<'a> {
         unit: u8,
         connect_ms: u32,
         answer_ms: u32,
-    ) -> Result<Self, Ended> {
+    ) -> Result<Self, LinkError> {
         let pending_off = PendingOff::default();
         let context = within(runtime, (connect_ms, &pending_off), async move {
             let stream = tokio::net::TcpStream::connect(address).await?;
@@ -110,7 +109,7 @@ impl<'a> Tcp<'a> {
             let traced = Traced { inner: stream, port: address.to_string() };
             Ok(tcp::attach_slave(traced, Slave(unit)))
         })?
-        .map_err(|error: std::io::Error| Ended::from(error))?;
+        .map_err(|error: std::io::Error| LinkError::from(error))?;
         Ok(Tcp { runtime, context, answer_ms, pending_off })
     }
 }
@@ -148,12 +147,12 @@ fn mismatch(error: &tokio_modbus::Error) -> String {
 }
 
 /// Parts what tokio-modbus parts: an exception of the instrument, and trouble on the way.
-fn part<T>(answer: Result<tokio_modbus::Result<T>, Ended>) -> Result<T, Trouble> {
+fn part<T>(answer: Result<tokio_modbus::Result<T>, LinkError>) -> Result<T, Trouble> {
     match answer {
         Ok(Ok(Ok(value))) => Ok(value),
         Ok(Ok(Err(exception))) => Err(Trouble::Refused(super::remedy::exception(exception.into()))),
-        Ok(Err(error)) => Err(Trouble::Ended(Ended::Io(mismatch(&error)))),
-        Err(ended) => Err(Trouble::Ended(ended)),
+        Ok(Err(error)) => Err(Trouble::LinkError(LinkError::Io(mismatch(&error)))),
+        Err(ended) => Err(Trouble::LinkError(ended)),
     }
 }
 

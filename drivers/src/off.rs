@@ -5,12 +5,11 @@
 //! not report 'off' without reading it back.
 
 use super::connection::Connection;
-use super::ended::Ended;
-pub use super::ended::OFF_WITHIN;
+use super::link_error::LinkError;
+pub use super::link_error::OFF_WITHIN;
 use super::mailbox::Mailbox;
 use super::ports::SetPoint;
-use realtime::clock::Clock;
-use realtime::ports::Nanos;
+use realtime::{Clock, Nanos};
 use std::sync::Arc;
 use std::sync::atomic::{AtomicBool, Ordering};
 use std::time::{Duration, Instant};
@@ -54,20 +53,20 @@ impl PendingOff {
 /// What a transport can do for an 'off'. It fails only where the connection carries nothing more.
 pub trait OffWay {
     /// Sends every safe set-point, whatever became of the one before. What was refused it tells the endpoint.
-    fn send_off(&mut self, connection: &mut Connection) -> Result<(), Ended>;
+    fn send_off(&mut self, connection: &mut Connection) -> Result<(), LinkError>;
 
     /// From now on answers are waited for as long as [`OFF_ANSWER_MS`], where the profile allows less.
     fn be_patient(&mut self, connection: &Connection);
 
     /// Gets the next state of the instrument into the endpoint.
-    fn read_state(&mut self, connection: &mut Connection) -> Result<(), Ended>;
+    fn read_state(&mut self, connection: &mut Connection) -> Result<(), LinkError>;
 }
 
 /// Switches an instrument off and reads it back.
 ///
 /// # Errors
 /// The connection carries nothing more, or the time is over and the instrument has not shown 'off'.
-pub fn switch_off(connection: &mut Connection, way: &mut dyn OffWay) -> Result<(), Ended> {
+pub fn switch_off(connection: &mut Connection, way: &mut dyn OffWay) -> Result<(), LinkError> {
     if !connection.endpoint.is_actuator() {
         return Ok(());
     }
@@ -79,22 +78,22 @@ pub fn switch_off(connection: &mut Connection, way: &mut dyn OffWay) -> Result<(
             return Ok(());
         }
         if connection.off_time_over() {
-            return Err(Ended::StillOn);
+            return Err(LinkError::StillOn);
         }
         connection.sleep_until(Some(connection.now().plus(Nanos(AGAIN.as_nanos() as u64))));
     }
 }
 
 /// The end of a conversation whose thread is to stop: off, read back.
-pub fn at_the_end(connection: &mut Connection, way: &mut dyn OffWay) -> Ended {
-    switch_off(connection, way).err().unwrap_or(Ended::Stopped)
+pub fn at_the_end(connection: &mut Connection, way: &mut dyn OffWay) -> LinkError {
+    switch_off(connection, way).err().unwrap_or(LinkError::Stopped)
 }
 
 /// The start of a conversation after a lost one: an owed 'off' leaves before any request.
 ///
 /// # Errors
 /// The connection carries nothing more.
-pub fn at_the_beginning(connection: &mut Connection, way: &mut dyn OffWay) -> Result<(), Ended> {
+pub fn at_the_beginning(connection: &mut Connection, way: &mut dyn OffWay) -> Result<(), LinkError> {
     if connection.is_first() || !connection.endpoint.owes_off() {
         Ok(())
     } else if connection.stopping() {

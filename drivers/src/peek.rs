@@ -1,13 +1,13 @@
 //! A look at an instrument that has no profile yet: registers, CAN frames or bytes. It reads, for a bounded
 //! time, and writes nothing.
 
-use super::ended::{AddressError, Ended};
+use super::link_error::{AddressError, LinkError};
 use super::modbus::{Registers, Trouble};
 use super::modbus_rtu::Rtu;
 use super::modbus_tcp::{Tcp, resolve};
 use super::remedy::advice;
 use super::transport::Address;
-use instruments::bus::CanEvent;
+use instruments::CanEvent;
 pub use instruments::profile::MOST_REGISTERS;
 use instruments::schema::Table;
 use std::collections::BTreeMap;
@@ -20,7 +20,7 @@ pub const MOST_BYTES: usize = 4096;
 
 /// What is at the address.
 #[derive(Debug, Clone, PartialEq, Eq)]
-pub enum Place {
+pub enum PeekAddress {
     /// A serial line, by its path.
     Serial(String),
     /// `host:port`.
@@ -29,7 +29,7 @@ pub enum Place {
     Can(String),
 }
 
-impl Place {
+impl PeekAddress {
     /// The place that an address means: `rtu:PATH` or `PATH`, `tcp:HOST:PORT`, `can:NAME` or `slcan:PATH`.
     pub fn of(address: &str) -> Self {
         let interface =
@@ -66,7 +66,7 @@ pub enum PeekError {
     #[error(transparent)]
     Io(#[from] std::io::Error),
     #[error("{0}; {advice}", advice = advice(&.0.to_string()))]
-    Link(#[from] Ended),
+    Link(#[from] LinkError),
     #[error("the instrument refused: {0}")]
     Refused(String),
     #[error("{0}; check speed, format and wiring of the line")]
@@ -80,7 +80,7 @@ impl From<Trouble> for PeekError {
         match trouble {
             Trouble::Refused(why) => Self::Refused(why),
             Trouble::Corrupt(why) => Self::Corrupt(why),
-            Trouble::Ended(ended) => ended.into(),
+            Trouble::LinkError(ended) => ended.into(),
         }
     }
 }
@@ -90,23 +90,23 @@ impl From<Trouble> for PeekError {
 /// # Errors
 /// Nobody there, or an answer that is no good.
 pub fn registers(
-    place: &Place,
+    place: &PeekAddress,
     speed: &Speed,
     unit: u8,
     table: Table,
     (first, count): (u16, u16),
 ) -> Result<Vec<u16>, PeekError> {
     let bytes = match place {
-        Place::Tcp(host) => {
+        PeekAddress::Tcp(host) => {
             let address = resolve(host, Some(502))?;
             let runtime = tokio::runtime::Builder::new_current_thread().enable_all().build()?;
             let with = (&runtime, &Instant::now().into());
             Tcp::connect(with, address, unit, PATIENCE_MS, PATIENCE_MS)?.read(table, first, count)?
         }
-        Place::Serial(path) => {
+        PeekAddress::Serial(path) => {
             Rtu::open(path, speed.baud, &speed.format, unit, PATIENCE_MS)?.read(table, first, count)?
         }
-        Place::Can(name) => return Err(PeekError::CanBus(name.clone(), "registers; leave them out")),
+        PeekAddress::Can(name) => return Err(PeekError::CanBus(name.clone(), "registers; leave them out")),
     };
     Ok(bytes.chunks_exact(2).map(|pair| u16::from_be_bytes([pair[0], pair[1]])).collect())
 }
@@ -146,11 +146,11 @@ pub fn frames(name: &str, bitrate: u32, long: Duration) -> Result<BTreeMap<(u32,
 ///
 /// # Errors
 /// Nobody there, or a line that fails.
-pub fn bytes(place: &Place, speed: &Speed, long: Duration) -> Result<Vec<u8>, PeekError> {
+pub fn bytes(place: &PeekAddress, speed: &Speed, long: Duration) -> Result<Vec<u8>, PeekError> {
     let address = match place {
-        Place::Serial(path) => Address::Serial(path.clone(), speed.baud, speed.format.clone()),
-        Place::Tcp(host) => Address::Tcp(resolve(host, None)?),
-        Place::Can(name) => return Err(PeekError::CanBus(name.clone(), "lines")),
+        PeekAddress::Serial(path) => Address::Serial(path.clone(), speed.baud, speed.format.clone()),
+        PeekAddress::Tcp(host) => Address::Tcp(resolve(host, None)?),
+        PeekAddress::Can(name) => return Err(PeekError::CanBus(name.clone(), "lines")),
     };
     let patience = Duration::from_millis(PATIENCE_MS.into());
     let mut transport = address.open(patience)?;
@@ -171,18 +171,18 @@ pub fn bytes(place: &Place, speed: &Speed, long: Duration) -> Result<Vec<u8>, Pe
 
 #[cfg(test)]
 mod tests {
-    use super::Place;
+    use super::PeekAddress;
 
     #[test]
     fn addresses_say_what_is_there() {
-        let serial = Place::Serial("/dev/ttyUSB0".into());
-        assert_eq!(Place::of("rtu:/dev/ttyUSB0"), serial);
-        assert_eq!(Place::of("/dev/ttyUSB0"), serial);
-        assert_eq!(Place::of("tcp:10.0.0.7:502"), Place::Tcp("10.0.0.7:502".into()));
+        let serial = PeekAddress::Serial("/dev/ttyUSB0".into());
+        assert_eq!(PeekAddress::of("rtu:/dev/ttyUSB0"), serial);
+        assert_eq!(PeekAddress::of("/dev/ttyUSB0"), serial);
+        assert_eq!(PeekAddress::of("tcp:10.0.0.7:502"), PeekAddress::Tcp("10.0.0.7:502".into()));
         for name in ["can0", "vcan1", "slcan:/dev/ttyACM0"] {
-            assert_eq!(Place::of(name), Place::Can(name.into()));
+            assert_eq!(PeekAddress::of(name), PeekAddress::Can(name.into()));
         }
-        assert_eq!(Place::of("can:mybus"), Place::Can("mybus".into()));
-        assert_eq!(Place::of("can/port"), Place::Serial("can/port".into()));
+        assert_eq!(PeekAddress::of("can:mybus"), PeekAddress::Can("mybus".into()));
+        assert_eq!(PeekAddress::of("can/port"), PeekAddress::Serial("can/port".into()));
     }
 }

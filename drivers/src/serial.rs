@@ -1,6 +1,6 @@
 //! Serial lines.
 
-use super::ended::Ended;
+use super::link_error::LinkError;
 use super::off::PendingOff;
 use super::trace;
 use serialport::{DataBits, Parity, SerialPort, StopBits};
@@ -22,16 +22,16 @@ impl Line {
     ///
     /// # Errors
     /// Where the port is not there, is in use, or the format makes no sense.
-    pub fn open(path: &str, baud: u32, format: &str) -> Result<Self, Ended> {
+    pub fn open(path: &str, baud: u32, format: &str) -> Result<Self, LinkError> {
         let (data, parity, stop) = parse_format(format)
-            .ok_or_else(|| Ended::Io(format!("`{format}` is not a serial format such as 8N1")))?;
+            .ok_or_else(|| LinkError::Io(format!("`{format}` is not a serial format such as 8N1")))?;
         let port = serialport::new(path, baud)
             .data_bits(data)
             .parity(parity)
             .stop_bits(stop)
             .timeout(Duration::from_millis(5))
             .open()
-            .map_err(|error| Ended::Io(format!("{path}: {error}")))?;
+            .map_err(|error| LinkError::Io(format!("{path}: {error}")))?;
         Ok(Self { port, name: path.into() })
     }
 
@@ -40,12 +40,12 @@ impl Line {
     /// # Errors
     /// Where the port is gone. An unplugged port gives `Ok(0)` at once and for ever
     /// (espmonitor issue 12): that is an error too, else the thread would spin.
-    pub fn read(&mut self, buffer: &mut [u8], deadline: Instant) -> Result<usize, Ended> {
+    pub fn read(&mut self, buffer: &mut [u8], deadline: Instant) -> Result<usize, LinkError> {
         loop {
             let left = deadline.saturating_duration_since(Instant::now());
             self.port
                 .set_timeout(left.max(Duration::from_micros(100)))
-                .map_err(|error| Ended::Io(error.to_string()))?;
+                .map_err(|error| LinkError::Io(error.to_string()))?;
             match came(self.port.read(buffer))? {
                 Some(count) => {
                     trace::received(&self.name, &buffer[..count]);
@@ -61,8 +61,10 @@ impl Line {
     ///
     /// # Errors
     /// Where the port does not take them.
-    pub fn write(&mut self, bytes: &[u8]) -> Result<(), Ended> {
-        self.port.set_timeout(Duration::from_millis(500)).map_err(|error| Ended::Io(error.to_string()))?;
+    pub fn write(&mut self, bytes: &[u8]) -> Result<(), LinkError> {
+        self.port
+            .set_timeout(Duration::from_millis(500))
+            .map_err(|error| LinkError::Io(error.to_string()))?;
         trace::sent(&self.name, bytes);
         self.port.write_all(bytes)?;
         Ok(())
@@ -78,7 +80,7 @@ impl Line {
         quiet: Duration,
         most: Duration,
         pending_off: &PendingOff,
-    ) -> Result<bool, Ended> {
+    ) -> Result<bool, LinkError> {
         let (mut silent, mut end) = (Instant::now() + quiet, Instant::now() + most);
         let mut buffer = [0; 512];
         while Instant::now() < end {
@@ -112,7 +114,7 @@ impl SharedLine {
     ///
     /// # Errors
     /// What [`Line::open`] says, and a line that is open with other settings.
-    pub fn open(path: &str, baud: u32, format: &str) -> Result<Self, Ended> {
+    pub fn open(path: &str, baud: u32, format: &str) -> Result<Self, LinkError> {
         let key = std::fs::canonicalize(path).unwrap_or_else(|_| path.into());
         let settings = (baud, format.to_string());
         let mut all = OPEN.lock().unwrap_or_else(PoisonError::into_inner);
@@ -121,7 +123,7 @@ impl SharedLine {
         if let Some(open) = all.iter().filter_map(Weak::upgrade).find(whole) {
             let (baud, format) = &open.settings;
             let other = format!("{path} is open for another unit at {baud} baud, {format}");
-            return if open.settings == settings { Ok(Self(open)) } else { Err(Ended::Io(other)) };
+            return if open.settings == settings { Ok(Self(open)) } else { Err(LinkError::Io(other)) };
         }
         let line = Mutex::new(Line::open(path, baud, format)?);
         let open = Arc::new(Open { key, settings, line, gone: AtomicBool::new(false) });
@@ -133,9 +135,9 @@ impl SharedLine {
     ///
     /// # Errors
     /// What the exchange says.
-    pub fn with<T>(&self, exchange: impl FnOnce(&mut Line) -> Result<T, Ended>) -> Result<T, Ended> {
+    pub fn with<T>(&self, exchange: impl FnOnce(&mut Line) -> Result<T, LinkError>) -> Result<T, LinkError> {
         let done = exchange(&mut self.0.line.lock().unwrap_or_else(PoisonError::into_inner));
-        if matches!(done, Err(Ended::Io(_))) {
+        if matches!(done, Err(LinkError::Io(_))) {
             self.0.gone.store(true, Ordering::Release);
         }
         done
@@ -143,10 +145,10 @@ impl SharedLine {
 }
 
 /// How many bytes a read brought; `None` where it is to be tried again until the deadline.
-fn came(read: std::io::Result<usize>) -> Result<Option<usize>, Ended> {
+fn came(read: std::io::Result<usize>) -> Result<Option<usize>, LinkError> {
     use std::io::ErrorKind::{Interrupted, TimedOut};
     match read {
-        Ok(0) => Err(Ended::Io("the port is gone (unplugged?)".into())),
+        Ok(0) => Err(LinkError::Io("the port is gone (unplugged?)".into())),
         Ok(count) => Ok(Some(count)),
         Err(error) if matches!(error.kind(), TimedOut | Interrupted) => Ok(None),
         Err(error) => Err(error.into()),
@@ -187,12 +189,12 @@ mod tests {
         assert!(Arc::ptr_eq(&first.0, &second.0));
         let other = SharedLine::open(&path, 19_200, "8N1").err().unwrap().to_string();
         assert!(other.contains("9600"), "{other}");
-        first.with(|_| Err::<(), _>(Ended::Timeout(5))).unwrap_err();
+        first.with(|_| Err::<(), _>(LinkError::Timeout(5))).unwrap_err();
         assert!(
             Arc::ptr_eq(&SharedLine::open(&path, 9600, "8N1").unwrap().0, &first.0),
             "a late answer is no end"
         );
-        first.with(|_| Err::<(), _>(Ended::Io("unplugged".into()))).unwrap_err();
+        first.with(|_| Err::<(), _>(LinkError::Io("unplugged".into()))).unwrap_err();
         drop(first);
         assert!(SharedLine::open(&path, 9600, "8N1").is_err(), "the second still holds the port");
         drop(second);

@@ -1,8 +1,8 @@
 //! The instruments' part of a setup.
 
 use super::OpenError;
-use super::ended::AddressError;
-use super::library::Source;
+use super::link_error::AddressError;
+use super::user_profiles::Source;
 use instruments::Profile;
 use serde::{Deserialize, Serialize};
 use std::sync::Arc;

@@ -1,10 +1,10 @@
 //! CAN through a serial adapter (slcan).
 
-use super::ended::Ended;
+use super::link_error::LinkError;
 use super::off::PendingOff;
 use super::serial::Line;
-use instruments::bus::{CanEvent, CanPort};
 use instruments::codec::can::{CanFrame, SlcanReader, slcan_line, slcan_speed};
+use instruments::{CanEvent, CanPort};
 use std::collections::VecDeque;
 use std::io;
 use std::time::{Duration, Instant};
@@ -21,9 +21,9 @@ impl Slcan {
     ///
     /// # Errors
     /// Where the port is not there or the bit rate is none of the protocol's.
-    pub fn open(path: &str, bitrate: u32) -> Result<Self, Ended> {
+    pub fn open(path: &str, bitrate: u32) -> Result<Self, LinkError> {
         let speed = slcan_speed(bitrate)
-            .ok_or_else(|| Ended::Io(format!("slcan knows no bit rate of {bitrate} per second")))?;
+            .ok_or_else(|| LinkError::Io(format!("slcan knows no bit rate of {bitrate} per second")))?;
         // Adapters of this kind are USB: the symbol rate of the line means nothing to them.
         let mut line = Line::open(path, 115_200, "8N1")?;
         line.write(b"\rC\r")?;

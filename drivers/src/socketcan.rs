@@ -4,8 +4,7 @@
 //! bus-off ends the connection, nothing restarts by itself, and the caller learns of a queue without room and
 //! sends the newest command instead of queueing more.
 
-use instruments::bus::{CanEvent, CanPort};
-use instruments::codec::can::CanFrame;
+use instruments::{CanEvent, CanFrame, CanPort};
 use socketcan::{
     CanDataFrame, CanError, CanFrame as Raw, CanSocket, EmbeddedFrame, ExtendedId, Frame, Id, Socket,
     SocketOptions, StandardId,

@@ -1,7 +1,7 @@
 //! Frames that come by themselves: bytes in, samples out, whatever carries them.
 
 use super::connection::{Connection, LONGEST_SLEEP};
-use super::ended::Ended;
+use super::link_error::LinkError;
 use instruments::codec::stream::Cutter;
 use instruments::schema::Stream;
 use std::sync::atomic::Ordering;
@@ -11,10 +11,10 @@ use std::time::{Duration, Instant};
 const LONGEST_LINE: usize = 4096;
 
 /// Takes the first whole line out of what came; returns it without its end.
-pub(crate) fn first_line(came: &mut Vec<u8>, end: &[u8]) -> Result<Option<Vec<u8>>, Ended> {
+pub(crate) fn first_line(came: &mut Vec<u8>, end: &[u8]) -> Result<Option<Vec<u8>>, LinkError> {
     match came.windows(end.len()).position(|window| window == end) {
         Some(at) => Ok(Some(came.drain(..at + end.len()).take(at).collect())),
-        None if came.len() > LONGEST_LINE => Err(Ended::Corrupt("a line without an end".into())),
+        None if came.len() > LONGEST_LINE => Err(LinkError::Corrupt("a line without an end".into())),
         None => Ok(None),
     }
 }
@@ -50,10 +50,10 @@ pub fn listen(
     connection: &mut Connection,
     stream: &Stream,
     parted: bool,
-    read: &mut dyn FnMut(&mut [u8], Instant) -> Result<usize, Ended>,
-) -> Result<(), Ended> {
+    read: &mut dyn FnMut(&mut [u8], Instant) -> Result<usize, LinkError>,
+) -> Result<(), LinkError> {
     let (profile, health) = (connection.endpoint.profile(), connection.endpoint.health());
-    let frame = profile.frame("stream").ok_or_else(|| Ended::Io("the profile has no stream".into()))?;
+    let frame = profile.frame("stream").ok_or_else(|| LinkError::Io("the profile has no stream".into()))?;
     let shape = profile.frames()[frame.0].clone();
     let limit_ms = profile.description.link.response_timeout_ms;
     let patience = Duration::from_millis(u64::from(limit_ms));
@@ -112,7 +112,7 @@ pub fn listen(
             connection.tell(Ok(()));
         }
         if last.elapsed() > patience {
-            return Err(Ended::Timeout(limit_ms));
+            return Err(LinkError::Timeout(limit_ms));
         }
     }
     Ok(())

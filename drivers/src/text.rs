@@ -6,8 +6,8 @@
 //! one. A binary answer is framed by its length, since its bytes may look like the end of a line.
 
 use super::connection::{Connection, Periodic, Spawned};
-use super::ended::{BAD_IN_A_ROW, Ended};
 use super::endpoint::Due;
+use super::link_error::{BAD_IN_A_ROW, LinkError};
 use super::off::{self, OFF_ANSWER_MS, OffWay};
 use super::remedy;
 use super::setup::InstrumentSetup;
@@ -104,14 +104,14 @@ impl Talk {
     }
 
     /// Takes in what comes; `false` where nothing did until the deadline.
-    fn take(&mut self, deadline: Instant) -> Result<bool, Ended> {
+    fn take(&mut self, deadline: Instant) -> Result<bool, LinkError> {
         let mut buffer = [0; 1024];
         let count = self.transport.read(&mut buffer, deadline)?;
         self.came.extend_from_slice(&buffer[..count]);
         Ok(count > 0)
     }
 
-    fn send(&mut self, line: &str) -> Result<(), Ended> {
+    fn send(&mut self, line: &str) -> Result<(), LinkError> {
         let gap = Duration::from_secs_f64(self.link.min_gap_ms.max(0.0) * 1e-3);
         std::thread::sleep(gap.saturating_sub(self.requested_at.elapsed()));
         self.transport.write(format!("{line}{}", self.link.tx_end()).as_bytes())?;
@@ -138,7 +138,7 @@ impl Talk {
     }
 
     /// A stream that runs by itself: only its start is sent.
-    fn listen(&mut self, connection: &mut Connection, stream: &Stream) -> Result<Infallible, Ended> {
+    fn listen(&mut self, connection: &mut Connection, stream: &Stream) -> Result<Infallible, LinkError> {
         if !connection.endpoint.profile().description.init.is_empty() {
             self.initialise(connection)?;
         }
@@ -147,11 +147,11 @@ impl Talk {
         super::stream::listen(connection, stream, parted, &mut |buffer, deadline| {
             self.transport.read(buffer, deadline)
         })?;
-        Err(Ended::Stopped)
+        Err(LinkError::Stopped)
     }
 
     /// Before a question nothing may be left of earlier answers.
-    fn clear(&mut self, connection: &mut Connection) -> Result<(), Ended> {
+    fn clear(&mut self, connection: &mut Connection) -> Result<(), LinkError> {
         while self.take(Instant::now())? {}
         self.unasked(connection);
         self.came.clear();
@@ -159,7 +159,7 @@ impl Talk {
     }
 
     /// The next line, without its end, that is no unsolicited one.
-    fn line(&mut self, connection: &mut Connection) -> Result<String, Ended> {
+    fn line(&mut self, connection: &mut Connection) -> Result<String, LinkError> {
         let end = self.link.rx_end().to_owned().into_bytes();
         let mut deadline = Instant::now() + self.limit();
         loop {
@@ -169,8 +169,8 @@ impl Talk {
             }
             if !self.take(connection.pending_off.look(&mut deadline))? && Instant::now() >= deadline {
                 return Err(match self.came.is_empty() {
-                    true => Ended::Timeout(connection.pending_off.limit_ms(self.patience_ms)),
-                    false => Ended::Cut(remedy::unended(&self.came, &end, &self.request)),
+                    true => LinkError::Timeout(connection.pending_off.limit_ms(self.patience_ms)),
+                    false => LinkError::Cut(remedy::unended(&self.came, &end, &self.request)),
                 });
             }
         }
@@ -178,15 +178,15 @@ impl Talk {
 
     /// A binary answer, framed by its length; `None` where more came than that: a line that came
     /// unasked may then stand in the middle of it.
-    fn block(&mut self, connection: &mut Connection, length: usize) -> Result<Option<Vec<u8>>, Ended> {
+    fn block(&mut self, connection: &mut Connection, length: usize) -> Result<Option<Vec<u8>>, LinkError> {
         let mut deadline = Instant::now() + self.limit();
         loop {
             self.unasked(connection);
             if self.came.len() < length {
                 if !self.take(connection.pending_off.look(&mut deadline))? && Instant::now() >= deadline {
                     return Err(match self.came.len() {
-                        0 => Ended::Timeout(connection.pending_off.limit_ms(self.patience_ms)),
-                        n => Ended::Cut(format!(
+                        0 => LinkError::Timeout(connection.pending_off.limit_ms(self.patience_ms)),
+                        n => LinkError::Cut(format!(
                             "{n} bytes came in place of {length}: {}",
                             remedy::shown(&self.came)
                         )),
@@ -200,7 +200,7 @@ impl Talk {
     }
 
     /// Ends a line that an earlier connection left incomplete, and drops the answers to it.
-    fn settle(&mut self) -> Result<(), Ended> {
+    fn settle(&mut self) -> Result<(), LinkError> {
         let quiet = Instant::now() + self.limit();
         self.send("")?;
         while self.take(quiet)? && Instant::now() < quiet {}
@@ -209,7 +209,7 @@ impl Talk {
     }
 
     /// Writes the safe set-points and waits for no answer. The 'off' that is answered and read back follows.
-    fn send_unanswered_off(&mut self, connection: &Connection) -> Result<(), Ended> {
+    fn send_unanswered_off(&mut self, connection: &Connection) -> Result<(), LinkError> {
         self.send("")?;
         for (set, value) in connection.endpoint.safe_set_points() {
             let profile = connection.endpoint.profile();
@@ -220,7 +220,7 @@ impl Talk {
         Ok(())
     }
 
-    fn initialise(&mut self, connection: &mut Connection) -> Result<(), Ended> {
+    fn initialise(&mut self, connection: &mut Connection) -> Result<(), LinkError> {
         // A socket is new with every connection: no line is incomplete there.
         if matches!(self.link.kind, LinkKind::Serial | LinkKind::Scpi) {
             self.settle()?;
@@ -240,13 +240,16 @@ impl Talk {
             let Some(expected) = &init.expect else { continue };
             let answer = self.line(connection)?;
             if !expected.iter().any(|start| answer.starts_with(start.as_str())) {
-                return Err(Ended::Refused(format!("`{send}` was answered by `{answer}`: {}", init.text)));
+                return Err(LinkError::Refused(format!(
+                    "`{send}` was answered by `{answer}`: {}",
+                    init.text
+                )));
             }
         }
         Ok(())
     }
 
-    fn go_on(mut self, connection: &mut Connection, rate_hz: Option<f64>) -> Result<Infallible, Ended> {
+    fn go_on(mut self, connection: &mut Connection, rate_hz: Option<f64>) -> Result<Infallible, LinkError> {
         connection.tell(Ok(()));
         let now = connection.now();
         let often = |(frame, query): (FrameId, Query)| {
@@ -278,7 +281,7 @@ impl Talk {
         }
     }
 
-    fn ask(&mut self, connection: &mut Connection, frame: FrameId, query: &Query) -> Result<(), Ended> {
+    fn ask(&mut self, connection: &mut Connection, frame: FrameId, query: &Query) -> Result<(), LinkError> {
         self.clear(connection)?;
         self.send(&query.send)?;
         let bytes = match query.length {
@@ -299,7 +302,7 @@ impl Talk {
                 let problem = format!("`{}` was answered by {by}", query.send);
                 self.note(connection, problem.clone());
                 // A few bad answers are borne.
-                return if self.bad >= BAD_IN_A_ROW { Err(Ended::Corrupt(problem)) } else { Ok(()) };
+                return if self.bad >= BAD_IN_A_ROW { Err(LinkError::Corrupt(problem)) } else { Ok(()) };
             }
         };
         self.bad = 0;
@@ -317,7 +320,7 @@ impl Talk {
 
     /// Sends the loop's command. One that drives or moves ends with the first set-point that is not taken, that comes too
     /// late or that an 'off' has overtaken, and is followed by an 'off'. One that does not goes on to its last set-point.
-    fn command(&mut self, connection: &mut Connection, set_points: &[(SetId, f64)]) -> Result<(), Ended> {
+    fn command(&mut self, connection: &mut Connection, set_points: &[(SetId, f64)]) -> Result<(), LinkError> {
         let on = connection.endpoint.wants_on();
         let mut all = true;
         for one in set_points {
@@ -335,13 +338,13 @@ impl Talk {
         }
         if self.bad >= BAD_IN_A_ROW {
             let last = connection.endpoint.health().report().last_problem;
-            return Err(Ended::Corrupt(format!("set-points are not taken: {last}")));
+            return Err(LinkError::Corrupt(format!("set-points are not taken: {last}")));
         }
         Ok(())
     }
 
     /// Sends one set-point. Whether the instrument took it.
-    fn set(&mut self, connection: &mut Connection, (set, value): (SetId, f64)) -> Result<bool, Ended> {
+    fn set(&mut self, connection: &mut Connection, (set, value): (SetId, f64)) -> Result<bool, LinkError> {
         let profile = connection.endpoint.profile();
         self.newest.insert(set, value);
         let newest = |other| self.newest(profile, other);
@@ -374,7 +377,7 @@ impl Talk {
 }
 
 impl OffWay for Talk {
-    fn send_off(&mut self, connection: &mut Connection) -> Result<(), Ended> {
+    fn send_off(&mut self, connection: &mut Connection) -> Result<(), LinkError> {
         let safe = connection.endpoint.hand_out_off(connection.now());
         let patience_ms = self.patience_ms;
         self.be_patient(connection);
@@ -384,7 +387,7 @@ impl OffWay for Talk {
             // An answer that stays away is not waited for twice, and keeps nothing from being sent.
             all &= match self.set(connection, one) {
                 Ok(taken) => taken,
-                Err(Ended::Timeout(_) | Ended::Cut(_) | Ended::Corrupt(_)) => false,
+                Err(LinkError::Timeout(_) | LinkError::Cut(_) | LinkError::Corrupt(_)) => false,
                 Err(ended) => return Err(ended),
             };
         }
@@ -399,7 +402,7 @@ impl OffWay for Talk {
         self.patience_ms = self.link.response_timeout_ms.max(OFF_ANSWER_MS);
     }
 
-    fn read_state(&mut self, connection: &mut Connection) -> Result<(), Ended> {
+    fn read_state(&mut self, connection: &mut Connection) -> Result<(), LinkError> {
         queries(connection).into_iter().try_for_each(|(frame, query)| self.ask(connection, frame, &query))
     }
 }
@@ -428,7 +431,7 @@ mod tests {
         link.response_timeout_ms = 3_600_000;
         let transport = Transport::Tcp(TcpStream::connect(address).unwrap(), String::new());
         let mut talk = Talk::new(transport, link);
-        let cut = Err(Ended::Timeout(off::OFF_WAITS_MS));
+        let cut = Err(LinkError::Timeout(off::OFF_WAITS_MS));
         assert_eq!(talk.line(&mut connection), cut);
         assert_eq!(talk.block(&mut connection, 4).map(|_| String::new()), cut);
     }

@@ -4,7 +4,7 @@
 //! sample cannot have been taken after its answer arrived, so `arrival - device time` is the clocks'
 //! offset plus a delay that is never negative: its smallest recent value is the best offset.
 
-use realtime::ports::Nanos;
+use realtime::Nanos;
 
 /// The smallest offset is sought over this long, in s: long enough to meet a quick answer, short
 /// enough that 50 ppm of drift make no more than 0.2 ms.
@@ -73,7 +73,7 @@ impl DeviceClock {
 
 /// What a sample counter says of the next sample.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub enum Step {
+pub enum CounterStep {
     /// A new sample; this many before it were lost.
     New {
         /// Samples that never came.
@@ -105,26 +105,26 @@ impl Counter {
     }
 
     /// What `count` says.
-    pub fn step(&mut self, count: u64) -> Step {
+    pub fn step(&mut self, count: u64) -> CounterStep {
         let Some(last) = self.last else {
             self.last = Some(count);
-            return Step::New { lost: 0 };
+            return CounterStep::New { lost: 0 };
         };
         let ahead = (count + self.modulo - last) % self.modulo;
         if ahead == 0 {
-            return Step::Same;
+            return CounterStep::Same;
         }
         if ahead > self.modulo / 2 {
             self.old_in_a_row += 1;
             if self.old_in_a_row < OLD_MEANS_RESET {
-                return Step::Old;
+                return CounterStep::Old;
             }
             *self = Self { last: Some(count), ..Self::new(self.modulo) };
-            return Step::Reset;
+            return CounterStep::Reset;
         }
         self.last = Some(count);
         self.old_in_a_row = 0;
-        Step::New { lost: ahead - 1 }
+        CounterStep::New { lost: ahead - 1 }
     }
 }
 
@@ -177,16 +177,16 @@ mod tests {
     #[test]
     fn counters() {
         let mut counter = Counter::new(65536);
-        assert_eq!(counter.step(65534), Step::New { lost: 0 });
-        assert_eq!(counter.step(65534), Step::Same);
-        assert_eq!(counter.step(1), Step::New { lost: 2 });
-        assert_eq!(counter.step(0), Step::Old);
-        assert_eq!(counter.step(65535), Step::Old);
-        assert_eq!(counter.step(2), Step::New { lost: 0 });
+        assert_eq!(counter.step(65534), CounterStep::New { lost: 0 });
+        assert_eq!(counter.step(65534), CounterStep::Same);
+        assert_eq!(counter.step(1), CounterStep::New { lost: 2 });
+        assert_eq!(counter.step(0), CounterStep::Old);
+        assert_eq!(counter.step(65535), CounterStep::Old);
+        assert_eq!(counter.step(2), CounterStep::New { lost: 0 });
         for _ in 0..2 {
-            assert_eq!(counter.step(60000), Step::Old);
+            assert_eq!(counter.step(60000), CounterStep::Old);
         }
-        assert_eq!(counter.step(60000), Step::Reset);
-        assert_eq!(counter.step(60001), Step::New { lost: 0 });
+        assert_eq!(counter.step(60000), CounterStep::Reset);
+        assert_eq!(counter.step(60001), CounterStep::New { lost: 0 });
     }
 }

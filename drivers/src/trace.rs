@@ -4,8 +4,7 @@
 //! the bytes in hexadecimal, and as text. Where nobody asks for the target one flag is looked at and nothing
 //! is formatted; the threads of the links write it, the loop has none of it.
 
-use instruments::bus::{CanEvent, CanPort};
-use instruments::codec::can::CanFrame;
+use instruments::{CanEvent, CanFrame, CanPort};
 use std::fmt;
 use std::io;
 use std::pin::Pin;

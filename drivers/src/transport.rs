@@ -1,7 +1,7 @@
 //! What carries lines of text, blocks of bytes and streams: a serial line, TCP, datagrams, or the attributes
 //! of a device that the kernel drives.
 
-use super::ended::{AddressError, Ended};
+use super::link_error::{AddressError, LinkError};
 use super::modbus_tcp::resolve;
 use super::serial::Line;
 use super::trace;
@@ -47,10 +47,10 @@ impl Address {
     ///
     /// # Errors
     /// Where nobody is there, or the port cannot be had.
-    pub fn open(&self, limit: Duration) -> Result<Transport, Ended> {
+    pub fn open(&self, limit: Duration) -> Result<Transport, LinkError> {
         match self {
             Self::Folder(path) if path.is_dir() => Ok(Transport::Folder(path.clone(), Vec::new())),
-            Self::Folder(path) => Err(Ended::Io(format!("{} is not a folder", path.display()))),
+            Self::Folder(path) => Err(LinkError::Io(format!("{} is not a folder", path.display()))),
             Self::Serial(path, baud, format) => Ok(Transport::Serial(Line::open(path, *baud, format)?)),
             Self::Tcp(address) => {
                 let stream = TcpStream::connect_timeout(address, limit)?;
@@ -61,7 +61,7 @@ impl Address {
                 let unspecified: IpAddr =
                     if address.is_ipv4() { [0, 0, 0, 0].into() } else { [0_u16; 8].into() };
                 let socket = UdpSocket::bind((unspecified, local_port.unwrap_or(0))).map_err(|error| {
-                    Ended::Io(format!("UDP port {} of this machine: {error}", local_port.unwrap_or(0)))
+                    LinkError::Io(format!("UDP port {} of this machine: {error}", local_port.unwrap_or(0)))
                 })?;
                 if local_port.is_none() {
                     // What others send is then not even seen.
@@ -90,7 +90,7 @@ impl Transport {
     ///
     /// # Errors
     /// Where the connection is gone.
-    pub fn read(&mut self, buffer: &mut [u8], deadline: Instant) -> Result<usize, Ended> {
+    pub fn read(&mut self, buffer: &mut [u8], deadline: Instant) -> Result<usize, LinkError> {
         let left = deadline.saturating_duration_since(Instant::now());
         match self {
             Transport::Serial(line) => line.read(buffer, deadline),
@@ -114,7 +114,7 @@ impl Transport {
                     stream.read(buffer)
                 };
                 match came {
-                    Ok(0) => Err(Ended::Io("the instrument closed the connection".into())),
+                    Ok(0) => Err(LinkError::Io("the instrument closed the connection".into())),
                     Ok(count) => {
                         trace::received(port, &buffer[..count]);
                         Ok(count)
@@ -134,7 +134,7 @@ impl Transport {
                     Ok(_) => Ok(0),
                     Err(error) if passed(&error) => Ok(0),
                     Err(error) if error.kind() == ErrorKind::ConnectionRefused => {
-                        Err(Ended::Io("nobody listens at the instrument's UDP port".into()))
+                        Err(LinkError::Io("nobody listens at the instrument's UDP port".into()))
                     }
                     Err(error) => Err(error.into()),
                 }
@@ -146,13 +146,13 @@ impl Transport {
     ///
     /// # Errors
     /// Where the connection does not take them.
-    pub fn write(&mut self, bytes: &[u8]) -> Result<(), Ended> {
+    pub fn write(&mut self, bytes: &[u8]) -> Result<(), LinkError> {
         match self {
             Transport::Serial(line) => line.write(bytes),
             Transport::Folder(path, came) => attribute(path, &String::from_utf8_lossy(bytes), came),
             Transport::Tcp(stream, port) => {
                 trace::sent(port, bytes);
-                stream.write_all(bytes).map_err(Ended::from)
+                stream.write_all(bytes).map_err(LinkError::from)
             }
             Transport::Udp(socket, instrument, port) => {
                 trace::sent(port, bytes);
@@ -165,7 +165,7 @@ impl Transport {
 }
 
 /// Reads the attribute that a line names, or writes to it what the line has after the name.
-fn attribute(folder: &Path, line: &str, came: &mut Vec<u8>) -> Result<(), Ended> {
+fn attribute(folder: &Path, line: &str, came: &mut Vec<u8>) -> Result<(), LinkError> {
     let line = line.trim();
     let (name, value) = line.split_once(' ').map_or((line, None), |(name, value)| (name, Some(value)));
     if name.is_empty() {
@@ -173,7 +173,7 @@ fn attribute(folder: &Path, line: &str, came: &mut Vec<u8>) -> Result<(), Ended>
     }
     let file = folder.join(name);
     let port = file.display().to_string();
-    let failed = |error: std::io::Error| Ended::Io(format!("{port}: {error}"));
+    let failed = |error: std::io::Error| LinkError::Io(format!("{port}: {error}"));
     if let Some(value) = value {
         trace::sent(&port, value.as_bytes());
         return std::fs::write(&file, value).map_err(failed);

@@ -4,11 +4,11 @@
 //! metres. They are queried once, before a calibration, and never changed. Each instrument numbers its
 //! decoders differently, and a wrong one gives a plausible wrong amplitude, so their names are queried first.
 
-use super::library::Source;
 use super::off::PendingOff;
 use super::serial::Line;
 use super::stream::first_line;
-use super::{Ended, OpenError};
+use super::user_profiles::Source;
+use super::{LinkError, OpenError};
 use calibration::amplitude::vibrometer::Decoder;
 use instruments::Profile;
 use instruments::codec::text::quantity;
@@ -136,16 +136,16 @@ pub fn settings(setup: &VibrometerSetup) -> Result<Settings, OpenError> {
         match talk.ask(&choice.ask.replace("{which}", &number.to_string())) {
             Ok(name) if is_name(&name) => decoders.push(name),
             // The end of the list: silence, or words that are no name.
-            Ok(_) | Err(Ended::Timeout(_) | Ended::Cut(_)) => break,
+            Ok(_) | Err(LinkError::Timeout(_) | LinkError::Cut(_)) => break,
             Err(error) => return Err(failed(error)),
         }
     }
-    let number = choose(&decoders, setup.decoder.as_deref()).map_err(|why| failed(Ended::Io(why)))?;
+    let number = choose(&decoders, setup.decoder.as_deref()).map_err(|why| failed(LinkError::Io(why)))?;
     let mut read = || talk.settings(&profile, number, &decoders).map_err(failed);
     let (first, second) = (read()?, read()?);
     if first != second {
         let why = "the settings changed while they were read; let nobody touch the controller and ask again";
-        return Err(failed(Ended::Io(why.into())));
+        return Err(failed(LinkError::Io(why.into())));
     }
     Ok(first)
 }
@@ -185,7 +185,7 @@ struct Talk {
 
 impl Talk {
     /// One question and its answer, a line.
-    fn ask(&mut self, question: &str) -> Result<String, Ended> {
+    fn ask(&mut self, question: &str) -> Result<String, LinkError> {
         let came = self.link.rx_end().as_bytes();
         self.came.clear();
         self.line.write(format!("{question}{}", self.link.tx_end()).as_bytes())?;
@@ -194,7 +194,7 @@ impl Talk {
             if let Some(line) = first_line(&mut self.came, came)? {
                 let answer = String::from_utf8_lossy(&line).trim().to_string();
                 if answer == question {
-                    return Err(Ended::Refused("it echoes what it is sent: switch its Echo off".into()));
+                    return Err(LinkError::Refused("it echoes what it is sent: switch its Echo off".into()));
                 }
                 return Ok(answer);
             }
@@ -203,32 +203,37 @@ impl Talk {
             self.came.extend_from_slice(&buffer[..count]);
             if count == 0 && Instant::now() >= deadline {
                 return Err(match self.came.is_empty() {
-                    true => Ended::Timeout(self.link.response_timeout_ms),
-                    false => Ended::Cut(super::remedy::unended(&self.came, came, question)),
+                    true => LinkError::Timeout(self.link.response_timeout_ms),
+                    false => LinkError::Cut(super::remedy::unended(&self.came, came, question)),
                 });
             }
         }
     }
 
-    fn settings(&mut self, profile: &Profile, number: u8, decoders: &[String]) -> Result<Settings, Ended> {
+    fn settings(
+        &mut self,
+        profile: &Profile,
+        number: u8,
+        decoders: &[String],
+    ) -> Result<Settings, LinkError> {
         let mut values = profile.values();
         for (frame, query) in profile.queries() {
             let question = query.send.replace("{which}", &number.to_string());
             let answer = self.ask(&question)?;
             let unit = query.unit.as_deref().unwrap_or("");
             let value = quantity(&answer, unit)
-                .ok_or_else(|| Ended::Refused(format!("`{question}` was answered by `{answer}`")))?;
+                .ok_or_else(|| LinkError::Refused(format!("`{question}` was answered by `{answer}`")))?;
             profile
                 .decode(frame, &value.to_be_bytes(), &mut values)
-                .map_err(|error| Ended::Refused(format!("`{question}`, `{answer}`: {error}")))?;
+                .map_err(|error| LinkError::Refused(format!("`{question}`, `{answer}`: {error}")))?;
         }
         let value = |name: &str| {
             let signal = profile.signal(name);
             let signal =
-                signal.ok_or_else(|| Ended::Refused(format!("the profile has no signal `{name}`")))?;
+                signal.ok_or_else(|| LinkError::Refused(format!("the profile has no signal `{name}`")))?;
             match profile.refusal(signal, &values) {
                 None => Ok(values.get(signal)),
-                Some(why) => Err(Ended::Refused(format!("{name} = {}: {why:?}", values.get(signal)))),
+                Some(why) => Err(LinkError::Refused(format!("{name} = {}: {why:?}", values.get(signal)))),
             }
         };
         Ok(Settings {

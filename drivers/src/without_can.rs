@@ -1,7 +1,6 @@
 //! In the place of the kernel's CAN, where it was not built in or the system has none.
 
-use instruments::bus::{CanEvent, CanPort};
-use instruments::codec::can::CanFrame;
+use instruments::{CanEvent, CanFrame, CanPort};
 use std::convert::Infallible;
 use std::io;
 use std::time::Instant;

@@ -71,5 +71,9 @@ pub mod traffic;
 pub mod units;
 pub mod vector;
 
+pub use bus::{CanEvent, CanPort};
+pub use codec::can::CanFrame;
 pub use error::ProfileError;
-pub use profile::{FrameId, Profile, SetId, SignalId, Values};
+pub use profile::{FrameId, FrameKind, Profile, SetId, SignalId, Values};
+pub use schema::LinkKind;
+pub use units::{Dimension, Unit};

@@ -3,11 +3,9 @@
 //! Only what the line itself needs is counted: bits, and the pauses that the protocol demands. What an
 //! instrument takes to answer comes on top, and so do set-points; what does not fit so cannot work at all.
 
-use crate::Profile;
 use crate::codec::modbus_rtu::silence_s;
 use crate::codec::pattern::Pattern;
-use crate::profile::FrameKind;
-use crate::schema::LinkKind;
+use crate::{FrameKind, LinkKind, Profile};
 
 /// What a setup may state of a line.
 #[derive(Debug, Clone, Copy, Default)]

@@ -2,15 +2,12 @@
 //!
 //! `cargo bench -p muprime-models --bench prediction`
 
-use muprime_models::condition::Condition;
-use muprime_models::finger::Finger;
 use muprime_models::inverse::quick;
 use muprime_models::law_table::LawTable;
 use muprime_models::law_table::grid::Grid;
 use muprime_models::prediction::{EmpiricalPsi, FrictionModel, SpringSlider};
-use muprime_models::quantity::PeakToPeak;
 use muprime_models::spring_slider::{half_contact_angle_rad, solve};
-use muprime_models::surrogate::Surrogate;
+use muprime_models::{Condition, Finger, PeakToPeak, Surrogate};
 use std::f64::consts::PI;
 use std::hint::black_box;
 

@@ -2,10 +2,7 @@
 //!
 //! `cargo bench -p muprime-models --bench surrogate`
 
-use muprime_models::condition::Condition;
-use muprime_models::prediction::FrictionModel;
-use muprime_models::quantity::PeakToPeak;
-use muprime_models::surrogate::Surrogate;
+use muprime_models::{Condition, FrictionModel, PeakToPeak, Surrogate};
 use std::hint::black_box;
 
 #[global_allocator]

@@ -9,7 +9,7 @@ use crate::quantity::{Direction, PeakToPeak};
 
 /// What a covariate is, for whoever looks for smooth departures.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub enum Role {
+pub enum CovariateRole {
     /// Set by a plan.
     Setting,
     /// Time.
@@ -47,7 +47,7 @@ pub struct Covariate {
     /// What would be accepted, in words, where a value is not.
     pub needed: &'static str,
     /// What it is.
-    pub role: Role,
+    pub role: CovariateRole,
     /// Its scale.
     pub scale: Scale,
     /// Standard deviation (on the scale) up to which differences are regulation or noise and say nothing.
@@ -100,7 +100,7 @@ const LINEAR_SETTING: Covariate = Covariate {
     range: [f64::NEG_INFINITY, f64::INFINITY],
     from: true,
     needed: "",
-    role: Role::Setting,
+    role: CovariateRole::Setting,
     scale: Scale::Linear(1.0),
     least_spread: 0.0,
     level: None,
@@ -116,7 +116,7 @@ pub static TIME: Covariate = Covariate {
     shown: (1.0, "s"),
     range: [-1e10, 1e10],
     needed: "a number of seconds, at most 1e10",
-    role: Role::Time,
+    role: CovariateRole::Time,
     get: |c| Some(c.time_s),
     set: |c, v| c.time_s = v,
     ..LINEAR_SETTING
@@ -188,7 +188,7 @@ pub static POSITION: Covariate = Covariate {
     shown: (1e3, "mm"),
     range: [-100.0, 100.0],
     needed: "a number of metres, -100 to 100",
-    role: Role::Place,
+    role: CovariateRole::Place,
     get: |c| Some(c.position_m),
     set: |c, v| c.position_m = v,
     ..LINEAR_SETTING
@@ -233,7 +233,7 @@ pub static TEMPERATURE: Covariate = Covariate {
     shown: (1.0, "\u{b0}C"),
     range: [-273.15, 1000.0],
     needed: "a temperature in degrees Celsius, -273.15 to 1000",
-    role: Role::Climate,
+    role: CovariateRole::Climate,
     // The resolution of a thermometer at the plate.
     least_spread: 0.1,
     get: |c| c.temperature_c,
@@ -248,7 +248,7 @@ pub static RELATIVE_HUMIDITY: Covariate = Covariate {
     shown: (1.0, "%"),
     range: [0.0, 100.0],
     needed: "a percentage, 0 to 100",
-    role: Role::Climate,
+    role: CovariateRole::Climate,
     // The repeatability of a capacitive hygrometer.
     least_spread: 2.0,
     get: |c| c.relative_humidity_pct,
@@ -299,7 +299,7 @@ pub static NEIGHBOURS: [&Covariate; 5] = [&AMPLITUDE, &SPEED, &FREQUENCY, &NORMA
 
 /// What a plan can set: everything but time and the day's climate.
 pub fn planned() -> impl Iterator<Item = &'static Covariate> {
-    let set = |c: &&Covariate| matches!(c.role, Role::Setting | Role::Place);
+    let set = |c: &&Covariate| matches!(c.role, CovariateRole::Setting | CovariateRole::Place);
     REQUIRED.into_iter().chain(OPTIONAL).filter(set)
 }
 

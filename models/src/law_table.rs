@@ -69,7 +69,7 @@ const fn variable(c: &'static Covariate, range: [f64; 2], needed: &'static str) 
 }
 
 /// What a table answers, and over what.
-pub struct Answers {
+pub struct TabulatedQuantity {
     /// The kind of table, in words with an article.
     pub what: &'static str,
     /// How many of [`VARIABLES`] it may have.
@@ -83,7 +83,7 @@ pub struct Answers {
 }
 
 /// What a law answers.
-const LAW: Answers = Answers {
+const LAW: TabulatedQuantity = TabulatedQuantity {
     what: "a law table",
     variables: OF_LAWS,
     columns: &ANSWERS,
@@ -136,7 +136,7 @@ enum Column {
     Answer(usize),
 }
 
-fn column(of: &Answers, name: &str, line: u64) -> Result<Column, LawTableError> {
+fn column(of: &TabulatedQuantity, name: &str, line: u64) -> Result<Column, LawTableError> {
     let variables = &VARIABLES[..of.variables];
     let answer = of.columns.iter().position(|a| a.0 == name).map(Column::Answer);
     variables.iter().find(|v| v.name == name).map(Column::Variable).or(answer).ok_or_else(|| {
@@ -164,7 +164,7 @@ impl LawTable {
     ///
     /// # Errors
     /// As [`LawTable::from_csv`].
-    pub fn answering(of: &Answers, text: &str) -> Result<LawTable, LawTableError> {
+    pub fn answering(of: &TabulatedQuantity, text: &str) -> Result<LawTable, LawTableError> {
         let text = text.trim_start_matches('\u{feff}');
         let mut builder = csv::ReaderBuilder::new();
         let mut reader = builder.trim(csv::Trim::All).comment(Some(b'#')).from_reader(text.as_bytes());

@@ -60,3 +60,15 @@ pub mod sparse;
 pub mod spring_slider;
 pub mod surrogate;
 pub mod target;
+
+pub use condition::{Ambient, Condition, OutOfDomain};
+pub use covariate::Covariate;
+pub use finger::Finger;
+pub use law::BuiltIn;
+pub use pass::Pass;
+pub use prediction::{FrictionModel, SpringSlider};
+pub use quantity::{Direction, PeakToPeak};
+pub use reading::Reading;
+pub use rig_file::{Calibration, PassNoise, RigFile};
+pub use surrogate::Surrogate;
+pub use target::Target;

@@ -67,7 +67,7 @@ impl fmt::Display for PsiStar {
 
 /// The fit, with what else is known of it.
 #[derive(Clone, Copy, Debug, PartialEq)]
-pub struct Fit {
+pub struct PsiStarFit {
     /// `Psi*`.
     pub psi_star: f64,
     /// Its interval of 95 %, low end.
@@ -135,7 +135,7 @@ pub fn of_passes(
     poisson_ratio: f64,
     noise: PassNoise,
     scale_sd: f64,
-) -> Option<Fit> {
+) -> Option<PsiStarFit> {
     let usable = |v: f64| v.is_finite() && v > 0.0;
     let (mut still, mut moving) = (Vec::new(), Vec::new());
     for (c, force_n) in passes {
@@ -158,7 +158,7 @@ pub fn of_conditions(
     poisson_ratio: f64,
     noise: PassNoise,
     scale_sd: f64,
-) -> Option<Fit> {
+) -> Option<PsiStarFit> {
     let loads: f64 = still.iter().map(|(c, _)| c.normal_force_n.powi(2)).sum();
     let mu0 = still.iter().map(|(c, force)| c.normal_force_n * force).sum::<f64>() / loads;
     if !(mu0.is_finite() && mu0 > 0.0) {
@@ -180,7 +180,7 @@ impl Means {
         mu0_variance: f64,
         scale_sd: f64,
         (passes, passes_low, passes_high): (u32, f64, Option<f64>),
-    ) -> Option<Fit> {
+    ) -> Option<PsiStarFit> {
         let ln_star = self.centre(mu0)?;
         // The slopes of the score in its unknowns, by differences: with what the conditions are off by, which
         // a linear law has not.
@@ -214,7 +214,7 @@ impl Means {
         };
         let shared = (in_mu0 / in_star).powi(2) * mu0_variance + scale_sd * scale_sd;
         let half = (quantile * quantile * between + Z95 * Z95 * shared).sqrt();
-        let fit = Fit {
+        let fit = PsiStarFit {
             psi_star: ln_star.exp(),
             low: (ln_star - half).exp(),
             high: (ln_star + half).exp(),

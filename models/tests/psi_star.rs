@@ -2,8 +2,8 @@
 //! part of Fig. 12: 200 elements, its frequencies, frictions and speeds at two of four amplitudes. The mesh's
 //! convergence takes minutes: `muprime model reproduce fig12 --elements N` prints it (docs/ridge.md).
 
+use muprime_models::Reading;
 use muprime_models::psi_fit::{PsiFit, fit};
-use muprime_models::reading::Reading;
 use muprime_models::ridge::study::{Panel, fig_9};
 use muprime_models::ridge::{RidgeCase, RunSettings, run};
 use rayon::prelude::*;

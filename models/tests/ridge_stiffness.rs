@@ -1,6 +1,6 @@
 //! Static stiffnesses of the ridge against closed forms; and what its ratio says of Psi*. Each test prints the numbers that it judges.
 
-use muprime_models::reading::Reading;
+use muprime_models::Reading;
 use muprime_models::ridge::patch::{Patch, plane_stress};
 use muprime_models::ridge::short_study;
 use muprime_models::ridge::static_stiffness::{HeldAt, Springs, of_case, of_mesh};

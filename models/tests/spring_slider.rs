@@ -1,11 +1,8 @@
 //! The slider's quick roots against plain bisection and its uncertainty against separate solutions, over the
 //! whole range of conditions: the same within 1e-10.
 
-use muprime_models::condition::Condition;
-use muprime_models::finger::Finger;
-use muprime_models::prediction::{FrictionModel, SpringSlider};
-use muprime_models::quantity::PeakToPeak;
 use muprime_models::spring_slider::{half_contact_angle_rad, solve};
+use muprime_models::{Condition, Finger, FrictionModel, PeakToPeak, SpringSlider};
 use std::f64::consts::PI;
 
 /// Halves the bracket until nothing is left of it.

@@ -1,10 +1,9 @@
 //! The shipped table against the finite element model, and against what it says of itself.
 
-use muprime_models::condition::Condition;
 use muprime_models::prediction::{FrictionModel, Validity};
-use muprime_models::quantity::PeakToPeak;
 use muprime_models::ridge::run;
 use muprime_models::surrogate::{Grid, Surrogate, TableError};
+use muprime_models::{Condition, PeakToPeak};
 
 #[test]
 fn the_shipped_table_belongs_to_this_model() {

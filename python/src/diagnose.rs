@@ -1,16 +1,15 @@
 //! The diagnosis of a table.
 
 use crate::{MuprimeError, refused};
-use diagnosis::data::Table;
-use diagnosis::document::{document, predictions};
-use diagnosis::hypotheses::Options;
+use diagnosis::report::document::{document, predictions};
+use diagnosis::{Options, Table};
 use miette::{Context, IntoDiagnostic};
 use models::pass::read_passes;
 use pyo3::prelude::*;
 use runs::verdict_text::{corrected_model, words};
 use std::path::{Path, PathBuf};
 use tables::diagnose::Subject;
-use tables::joined::{Part, joined, start_of};
+use tables::joined::{JoinedTable, joined, start_of};
 use tables::law::{for_finger, of_text, own_effects};
 use tables::passes::parse_passes;
 
@@ -68,7 +67,11 @@ fn texts(
     for (name, bytes, run) in tables {
         let passes = parse_passes(Path::new(&name), &bytes)?;
         let start_unix_s = run.as_ref().and_then(|run| start_of(run));
-        parts.push(Part { name: run.map_or(name, |run| run.display().to_string()), passes, start_unix_s });
+        parts.push(JoinedTable {
+            name: run.map_or(name, |run| run.display().to_string()),
+            passes,
+            start_unix_s,
+        });
         all.extend(bytes);
     }
     let mut subject =

@@ -1,14 +1,10 @@
 //! Friction laws on columns: one call, all cores, the interpreter free.
 
 use crate::MuprimeError;
-use models::condition::Condition;
-use models::finger::Finger;
-use models::law::BuiltIn;
 use models::prediction::{EmpiricalPsi, FrictionModel, Validity};
 use models::psi::{self, PsiEq17};
 use models::psi_fit;
-use models::quantity::PeakToPeak;
-use models::reading::Reading;
+use models::{BuiltIn, Condition, Finger, PeakToPeak, Reading};
 use pyo3::buffer::PyBuffer;
 use pyo3::prelude::*;
 use rayon::prelude::*;

@@ -2,11 +2,9 @@
 
 use crate::{MuprimeError, refused};
 use miette::IntoDiagnostic;
-use models::prediction::{FrictionModel, SpringSlider};
+use models::{FrictionModel, SpringSlider};
 use pyo3::prelude::*;
-use runs::job::Job;
-use runs::plan::Plan;
-use runs::setup::Setup;
+use runs::{Job, Plan, Setup};
 use std::path::PathBuf;
 use std::sync::Arc;
 

@@ -2,7 +2,7 @@
 
 use crate::MuprimeError;
 use crate::laws::columns_of;
-use models::quantity::PeakToPeak;
+use models::PeakToPeak;
 use models::ridge::{RidgeCase, RunSettings, case, run as solve};
 use pyo3::buffer::PyBuffer;
 use pyo3::prelude::*;

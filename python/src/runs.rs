@@ -1,12 +1,11 @@
 //! A run's folder, and a sweep on the virtual rig in virtual time.
 
 use crate::{MuprimeError, refused};
-use models::law::BuiltIn;
+use models::BuiltIn;
 use pyo3::prelude::*;
 use pyo3::types::PyBytes;
 use runs::job::{Job, Notes, Signals};
-use runs::plan::Plan;
-use runs::setup::Setup;
+use runs::{Plan, Setup};
 use std::path::{Path, PathBuf};
 use std::sync::Arc;
 use std::sync::atomic::Ordering;

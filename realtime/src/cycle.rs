@@ -9,9 +9,7 @@ use crate::estimate::{EstimateConfig, Mu0, MuRelative, NoMu, Window};
 use crate::ports::Nanos;
 use crate::render::{Render, Rendered};
 use crate::safety::{Controls, Decision, Exposed, Limits, Observation, Request, Safety};
-use models::condition::{Ambient, Condition};
-use models::prediction::FrictionModel;
-use models::quantity::{Direction, PeakToPeak};
+use models::{Ambient, Condition, Direction, FrictionModel, PeakToPeak};
 use serde::{Deserialize, Serialize};
 
 /// What the loop is doing, as the sweep sees it. It goes into the record with every cycle.

@@ -2,7 +2,7 @@
 #![deny(clippy::disallowed_types, clippy::disallowed_methods)]
 
 use crate::ports::{Nanos, Sample};
-use models::quantity::Direction;
+use models::Direction;
 use serde::{Deserialize, Serialize};
 
 /// Largest window of the running mean, in samples.

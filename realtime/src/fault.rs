@@ -77,7 +77,7 @@ impl FaultMode {
 /// Which channel is at fault.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash, Serialize, Deserialize)]
 #[serde(rename_all = "snake_case")]
-pub enum Target {
+pub enum FaultTarget {
     /// The lateral force.
     Lateral,
     /// The normal force.
@@ -96,7 +96,7 @@ pub enum Target {
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
 pub struct Fault {
     /// Which channel.
-    pub target: Target,
+    pub target: FaultTarget,
     /// What is wrong.
     pub mode: FaultMode,
     /// From this loop time on.
@@ -258,7 +258,7 @@ struct Line<S: Sampled> {
 }
 
 impl<S: Sampled> Line<S> {
-    fn new(target: [Target; 2], faults: &[Fault], seed: u64) -> Self {
+    fn new(target: [FaultTarget; 2], faults: &[Fault], seed: u64) -> Self {
         let mut mine = faults.iter().filter(|f| target.contains(&f.target)).copied();
         Line {
             faults: std::array::from_fn(|_| mine.next()),
@@ -367,8 +367,8 @@ pub struct FaultyForce<P> {
 impl<P: ForceSensor> FaultyForce<P> {
     /// Wraps a sensor; of `faults` it takes those of the forces, at most [`FAULTS`] an axis.
     pub fn new(inner: P, faults: &[Fault], seed: u64) -> Self {
-        let lateral = Line::new([Target::Lateral, Target::Force], faults, seed);
-        let normal = Line::new([Target::Normal, Target::Force], faults, seed.rotate_left(17));
+        let lateral = Line::new([FaultTarget::Lateral, FaultTarget::Force], faults, seed);
+        let normal = Line::new([FaultTarget::Normal, FaultTarget::Force], faults, seed.rotate_left(17));
         FaultyForce { inner, lateral, normal }
     }
 }
@@ -395,8 +395,10 @@ pub struct FaultyAmplifier<P> {
 impl<P: Amplifier> FaultyAmplifier<P> {
     /// Wraps an amplifier; of `faults` it takes those of the amplifier and of its drive commands.
     pub fn new(inner: P, faults: &[Fault], seed: u64) -> Self {
-        let states = Line::new([Target::Amplifier, Target::Amplifier], faults, seed.rotate_left(29));
-        let drive = Line::<StageState>::new([Target::Drive, Target::Drive], faults, seed.rotate_left(37));
+        let states =
+            Line::new([FaultTarget::Amplifier, FaultTarget::Amplifier], faults, seed.rotate_left(29));
+        let drive =
+            Line::<StageState>::new([FaultTarget::Drive, FaultTarget::Drive], faults, seed.rotate_left(37));
         FaultyAmplifier {
             inner,
             states,
@@ -455,7 +457,10 @@ pub struct FaultyStage<P> {
 impl<P: Stage> FaultyStage<P> {
     /// Wraps a stage; of `faults` it takes those of the stage.
     pub fn new(inner: P, faults: &[Fault], seed: u64) -> Self {
-        FaultyStage { inner, states: Line::new([Target::Stage, Target::Stage], faults, seed.rotate_left(41)) }
+        FaultyStage {
+            inner,
+            states: Line::new([FaultTarget::Stage, FaultTarget::Stage], faults, seed.rotate_left(41)),
+        }
     }
 }
 

@@ -8,7 +8,7 @@
 //! | [`estimate`] | `mu`, `mu'` with uncertainty and age; means over a pass |
 //! | [`compare`] | residuals against the model; the test that says when they disagree |
 //! | [`render`] | the amplitude of the next cycle for a wanted friction |
-//! | [`turn`] | one turn of the loop over real ports; the row that it leaves behind |
+//! | [`cycle_io`] | one cycle of the loop over real ports; the row that it leaves behind |
 //! | [`pacing`] | the thread: absolute deadlines, lateness histogram; in `pacing/machine.rs` what it asks of the machine |
 //! | [`clock`] | time of drivers, loop and virtual world; a virtual rig's can be held |
 //! | [`queue`] | commands to the loop; a stop waits behind nothing |
@@ -34,6 +34,7 @@
 pub mod clock;
 pub mod compare;
 pub mod cycle;
+pub mod cycle_io;
 pub mod estimate;
 pub mod fault;
 mod number;
@@ -46,4 +47,9 @@ pub mod replay;
 pub mod safety;
 mod signals;
 pub mod stall_monitor;
-pub mod turn;
+
+pub use clock::Clock;
+pub use cycle::{Command, Phase};
+pub use cycle_io::{Ports, Row};
+pub use ports::Nanos;
+pub use safety::{Cause, Limits};

@@ -5,7 +5,7 @@
 
 use crate::safety::{DriveCommand, StageCommand};
 pub use crate::signals::{
-    AmplifierState, Channel, Contact, Contacts, Forces, Nanos, NoData, Quality, Sample, StageState,
+    AmplifierState, Channel, Contacts, Forces, Nanos, NoData, Quality, SafetyContact, Sample, StageState,
     SupplyCommand, SupplyState,
 };
 

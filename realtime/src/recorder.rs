@@ -18,15 +18,14 @@ mod schema;
 mod sink;
 mod summary;
 
-use crate::ports::Nanos;
-use crate::turn::Row;
+use crate::{Nanos, Row};
 use mcap::McapError;
 use serde::Serialize;
 use sink::Sink;
 use std::collections::BTreeMap;
 use std::io::{Read, Seek, Write};
 
-pub use integrity::{Gap, Integrity, Place};
+pub use integrity::{DamagedStretch, Gap, Integrity};
 pub use read::{Entry, Reader};
 pub use recover::{Recovery, inspect, recover};
 

@@ -6,11 +6,9 @@
 #![deny(clippy::disallowed_types, clippy::disallowed_methods)]
 
 use crate::safety::{HARD, Limits};
-use models::condition::Condition;
 use models::inverse::{QuickAnswer, Reach, quick};
-use models::prediction::FrictionModel;
-use models::quantity::PeakToPeak;
 use models::target::{Feedback, MOST_DELAY, Target};
+use models::{Condition, FrictionModel, PeakToPeak};
 use serde::{Deserialize, Serialize};
 
 /// What a target wants at a position, and the amplitude for it.

@@ -1,8 +1,8 @@
 //! Runs recorded cycles again: the same inputs through the same code must lead to the same decisions, bit for bit.
 
 use crate::cycle::{self, Config, CycleState};
-use crate::turn::Row;
-use models::prediction::FrictionModel;
+use crate::cycle_io::Row;
+use models::FrictionModel;
 
 /// What a replay found.
 #[derive(Clone, Debug, Default, PartialEq, serde::Serialize)]

@@ -27,7 +27,7 @@ mod watch;
 use crate::signals::{
     AmplifierState, Contacts, Forces, Nanos, NoData, StageState, SupplyCommand, SupplyState,
 };
-use models::quantity::PeakToPeak;
+use models::PeakToPeak;
 use serde::{Deserialize, Serialize};
 
 pub use arming::Proof;
@@ -371,7 +371,7 @@ impl Safety {
             normal_usable: self.watch.normal.usable,
             remark: rules::remark(&context),
         };
-        let step = arming::Step {
+        let step = arming::ArmingStep {
             besides_the_cut: rules::first_broken_but(&context, self.excused(seen.supply)),
             broken,
             cuts_the_supply: rules::cuts_the_supply(&context),

@@ -1,7 +1,7 @@
 //! What a rig's instruments deliver: readings and states, each with its time; a missing one is a [`NoData`].
 #![deny(clippy::disallowed_types, clippy::disallowed_methods)]
 
-use models::quantity::PeakToPeak;
+use models::PeakToPeak;
 use serde::{Deserialize, Serialize};
 
 /// Monotonic time in nanoseconds from the start of the run. Never wall-clock time.
@@ -174,7 +174,7 @@ pub struct SupplyState {
 
 /// One safety contact. Closed is the safe state of each, so that a broken wire is the unsafe one.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
-pub struct Contact {
+pub struct SafetyContact {
     /// Whether the contact is closed.
     pub closed: bool,
     /// When this was read.
@@ -187,11 +187,11 @@ pub struct Contact {
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
 pub struct Contacts {
     /// Emergency stop: closed while it is not pressed.
-    pub emergency_stop: Result<Contact, NoData>,
+    pub emergency_stop: Result<SafetyContact, NoData>,
     /// Guard or cover: closed while it is shut.
-    pub interlock: Result<Contact, NoData>,
+    pub interlock: Result<SafetyContact, NoData>,
     /// Dead-man (enabling) device: closed while it is held.
-    pub dead_man: Result<Contact, NoData>,
+    pub dead_man: Result<SafetyContact, NoData>,
 }
 
 impl Contacts {

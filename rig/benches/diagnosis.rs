@@ -3,9 +3,8 @@
 //! `cargo bench -p muprime-rig --bench diagnosis`
 
 use diagnosis::data::{RigFile, Table};
-use diagnosis::hypotheses::Options;
-use diagnosis::verdict::diagnose;
-use models::condition::Condition;
+use diagnosis::{Options, diagnose};
+use models::Condition;
 use sim::sealed::{Ask, Stratum, generate_with_rig};
 
 const PASSES: usize = 500;

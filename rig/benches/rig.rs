@@ -4,15 +4,13 @@
 use divan::Bencher;
 use divan::counter::ItemsCount;
 use drivers::modbus::Registers;
-use models::condition::Condition;
-use models::finger::Finger;
 use models::prediction::{EmpiricalPsi, FrictionModel, SpringSlider};
+use models::{Condition, Finger};
 use realtime::cycle::{self, Command, CycleState, Inputs, Marker, Phase};
 use realtime::estimate::Mu0;
 use realtime::ports::{AmplifierState, Contacts, Forces, Nanos, NoData, Quality, Sample, StageState};
 use realtime::safety::{Observation, Request};
-use runs::plan::Plan;
-use runs::setup::Setup;
+use runs::{Plan, Setup};
 use sim::wire::SharedPlant;
 use sim::wire::modbus_tcp::ModbusTcpServer;
 use sim::wire::world::WorldPlant;

@@ -3,15 +3,14 @@
 //! `spin_us=100`, `awake`: what a setup's `[loop]` may ask for.
 #![allow(clippy::disallowed_methods, reason = "it measures time")]
 
-use models::finger::Finger;
-use models::prediction::SpringSlider;
+use models::{Finger, SpringSlider};
+use realtime::Ports;
 use realtime::pacing::{self, Lifeline, LoopParts, Pacing};
 use realtime::ports::{Amplifier, AmplifierState, ForceSensor, Forces, Nanos, NoData, Stage, StageState};
 use realtime::safety::{DriveCommand, StageCommand};
-use realtime::turn::Ports;
 use ringbuf::HeapRb;
 use ringbuf::traits::Split;
-use runs::setup::Setup;
+use runs::Setup;
 use std::sync::Arc;
 use std::sync::atomic::Ordering;
 

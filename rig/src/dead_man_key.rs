@@ -8,7 +8,7 @@
 //! nothing; it is given back whatever ends the run, but for a SIGKILL (`stty sane` does it then).
 
 use crate::terminal::{self, CtrlC};
-use realtime::cycle::Command;
+use realtime::Command;
 use std::io;
 use std::sync::Arc;
 use std::sync::atomic::{AtomicBool, Ordering};

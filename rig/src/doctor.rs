@@ -9,7 +9,7 @@ pub mod machine;
 mod ports;
 
 pub use follow::{ChannelReport, Follow};
-pub use judge::{Finding, Target, judge};
+pub use judge::{Finding, InspectionScope, judge};
 
 use drivers::{HealthReport, InstrumentSetup, InstrumentsSetup, OpenError};
 use ports::Opened;
@@ -17,7 +17,7 @@ use realtime::cycle::{COMMANDS_PER_CYCLE, Config, CycleState, Inputs, decide};
 use realtime::ports::{AmplifierState, Channel, Nanos, NoData, Quality, Sample};
 use realtime::safety::{Cause, ChannelTiming, Observation, Timing};
 use realtime::stall_monitor::{StallMonitor, StallReport};
-use runs::setup::Setup;
+use runs::Setup;
 use serde::Serialize;
 use std::time::{Duration, Instant};
 
@@ -31,7 +31,7 @@ pub type Role = &'static str;
 
 /// What a link counted in a second, over the whole inspection.
 #[derive(Clone, Debug, Default, Serialize)]
-pub struct Answers {
+pub struct LinkCounts {
     /// Samples a second.
     pub samples_per_s: f64,
     /// Share of the answers that were none: corrupt, refused, or too late.
@@ -57,7 +57,7 @@ pub struct Found {
     /// Its address.
     pub address: String,
     /// What its link counted, or why there is none.
-    pub answers: Result<Answers, OpenError>,
+    pub answers: Result<LinkCounts, OpenError>,
     /// Its channels.
     pub channels: Vec<ChannelReport>,
 }
@@ -224,7 +224,7 @@ pub fn inspect(setup: &Setup, instruments: &InstrumentsSetup) -> Inspection {
     Inspection { found: found.collect(), seen: last, blocking: rules.worst().filter(|_| whole), stalls }
 }
 
-fn answers(instrument: &InstrumentSetup, [before, after]: [&HealthReport; 2], seconds: f64) -> Answers {
+fn answers(instrument: &InstrumentSetup, [before, after]: [&HealthReport; 2], seconds: f64) -> LinkCounts {
     let bad = |h: &HealthReport| h.corrupt_frames + h.timeouts + h.exceptions;
     let (samples, repeats) = (after.samples - before.samples, after.repeats - before.repeats);
     let wrong = bad(after) - bad(before);
@@ -233,7 +233,7 @@ fn answers(instrument: &InstrumentSetup, [before, after]: [&HealthReport; 2], se
         .is_ok_and(|p| p.description.poll.is_empty() && p.description.query.is_empty());
     let lost = if unasked { after.lost_samples - before.lost_samples } else { 0 };
     let share = |n: u64, of: u64| if of == 0 { 0.0 } else { n as f64 / of as f64 };
-    Answers {
+    LinkCounts {
         samples_per_s: samples as f64 / seconds,
         bad_share: share(wrong, wrong + samples + repeats),
         lost_share: share(lost, lost + samples),

@@ -6,8 +6,7 @@
 use drivers::socketcan::KernelCan;
 use drivers::vibrometer::VibrometerSetup;
 use drivers::{InstrumentSetup, InstrumentsSetup};
-use instruments::Profile;
-use instruments::schema::LinkKind;
+use instruments::{LinkKind, Profile};
 use serialport::{SerialPort, TTYPort};
 use sim::wire::can::{CanDevice, CanEmulator, EmulatedAdapter};
 use sim::wire::device::Device;

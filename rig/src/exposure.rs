@@ -14,12 +14,12 @@
 #![allow(clippy::disallowed_methods, reason = "a ledger is written beside the loop, while the run goes")]
 
 use miette::WrapErr;
+use realtime::Nanos;
 use realtime::pacing::Lifeline;
-use realtime::ports::Nanos;
 use realtime::safety::{Exposed, Limits, MINUTE_NS, MINUTES, PART_MINUTES, PARTS};
+use runs::Setup;
 use runs::exposure_left::{Left, in_the_last_hour};
 use runs::job::Notes;
-use runs::setup::Setup;
 use serde::{Deserialize, Serialize};
 use std::collections::BTreeMap;
 use std::fs::{File, OpenOptions, Permissions, TryLockError};

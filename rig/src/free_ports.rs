@@ -6,9 +6,9 @@
 use crate::rig_lock::RigLock;
 use drivers::InstrumentSetup;
 use drivers::modbus_tcp::resolve;
-use instruments::schema::LinkKind;
+use instruments::LinkKind;
+use runs::Setup;
 use runs::input::Problems;
-use runs::setup::Setup;
 use std::collections::BTreeSet;
 use std::fs::OpenOptions;
 use std::net::{TcpListener, TcpStream};
@@ -129,7 +129,7 @@ fn line(path: &Path) -> Result<(), Closed> {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use drivers::library::Source;
+    use drivers::user_profiles::Source;
 
     /// An instrument with a socket, datagrams or a folder is none with a serial line.
     #[test]

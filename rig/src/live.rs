@@ -18,7 +18,7 @@ pub use feed::Feed;
 pub use message::{Ended, Message, Progress, Run, State, TimedEvent};
 pub use stop::stop;
 pub use view::View;
-pub use viewer::{Heard, Viewer};
+pub use viewer::{Received, Viewer};
 
 use serde::{Deserialize, Serialize};
 use std::os::linux::net::SocketAddrExt;

@@ -5,8 +5,8 @@
 //! is noticed otherwise: the amplifier then shows set-points that nobody here commanded, and the loop trips.
 
 use miette::WrapErr;
+use runs::Setup;
 use runs::files::open_plain;
-use runs::setup::Setup;
 use std::fs::{File, OpenOptions, Permissions, TryLockError};
 use std::io::{self, Read, Write};
 use std::os::unix::fs::PermissionsExt;

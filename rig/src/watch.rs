@@ -22,7 +22,7 @@ pub use style::Look;
 use crate::live::View;
 use crate::terminal::{self, CtrlC};
 use keys::Hand;
-use runs::job::Signals;
+use runs::Signals;
 use std::path::{Path, PathBuf};
 use std::sync::atomic::{AtomicBool, Ordering};
 use std::sync::mpsc::{Receiver, channel};

@@ -4,17 +4,17 @@
 //! the operator, or the world of a virtual rig. What a pass holds is what was found, with its source and its
 //! age, never what was planned.
 
-mod rig_side;
+mod ambient_control;
 
-pub use rig_side::{Answers, RigSide, World};
+pub use ambient_control::{AmbientControl, OperatorAnswers, World};
 
 use crate::input::{Problems, unit_meant, unit_of};
 use crate::plan::{Plan, series_place};
-use crate::sequence::MeasuredPass;
 use crate::setup::{Setup, SetupFile};
-use models::condition::{Ambient, Condition};
+use crate::sweep::MeasuredPass;
 use models::covariate::{self, Covariate};
-use realtime::ports::Nanos;
+use models::{Ambient, Condition};
+use realtime::Nanos;
 use serde::{Deserialize, Serialize};
 
 /// The quantities of the air that a plan can ask for, with the names that profiles give their signals and

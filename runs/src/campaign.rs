@@ -11,9 +11,8 @@
 mod origin;
 
 use crate::input::{self, Problems};
-use crate::plan::Plan;
 use crate::run_dir::Identity;
-use crate::setup::Setup;
+use crate::{Plan, Setup};
 use miette::IntoDiagnostic;
 use rand::SeedableRng;
 use rand::seq::SliceRandom;
@@ -267,7 +266,7 @@ pub fn sessions(file: &CampaignFile) -> Vec<CampaignRun> {
 /// Whether the run in a folder was completed.
 pub fn is_complete(run: &Path) -> bool {
     crate::job::Summary::written_in(run)
-        .is_some_and(|summary| summary.outcome == crate::sequence::Outcome::Complete)
+        .is_some_and(|summary| summary.outcome == crate::sweep::Outcome::Complete)
 }
 
 #[cfg(test)]

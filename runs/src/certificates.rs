@@ -13,11 +13,10 @@ use calibration::amplitude::apply::AmplitudeCalibration;
 use calibration::certificate::{Certificate, CertificateKind, Circumstances, Verified};
 use calibration::force::apply::ForceCalibration;
 use calibration::force::zero::Zero;
-use models::quantity::PeakToPeak;
-use models::rig_file::Calibration;
+use models::{Calibration, PeakToPeak};
+use realtime::Ports;
 use realtime::ports::{Amplifier, AmplifierState, ForceSensor, Forces, Nanos, NoData, Quality, Sample};
 use realtime::safety::DriveCommand;
-use realtime::turn::Ports;
 use std::path::Path;
 use temperature::TemperatureRange;
 

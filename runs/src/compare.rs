@@ -5,14 +5,11 @@
 //! for the references of both runs. Calibration that both runs share (gains, stiffnesses) cancels in a difference and is left out.
 
 use crate::ambient::{OfAir, air_set, air_words, one_air, values};
-use crate::human::{p_value, quantity};
+use crate::format::{p_value, quantity};
 use crate::report::levels;
-use crate::run_data::RunData;
-use crate::sequence::MeasuredPass;
-use models::condition::Ambient;
+use crate::{MeasuredPass, RunData};
 use models::pass::{Pass, REVERSED, coulomb_coefficient};
-use models::quantity::PeakToPeak;
-use models::rig_file::PassNoise;
+use models::{Ambient, PassNoise, PeakToPeak};
 use realtime::compare::VISIBLE_DEPARTURE;
 use serde::Serialize;
 use statrs::distribution::{ChiSquared, ContinuousCDF, Normal};
@@ -106,7 +103,7 @@ impl Paired {
 /// What the comparison comes to.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize)]
 #[serde(rename_all = "snake_case")]
-pub enum Answer {
+pub enum ComparisonAnswer {
     /// The runs differ by more than their uncertainty explains.
     Differ,
     /// No difference was seen, and one of [`VISIBLE_DEPARTURE`] would have been.
@@ -126,8 +123,8 @@ impl Comparison {
     }
 
     /// The answer; without a condition in common none can be given.
-    pub fn answer(&self) -> Answer {
-        self.judged.as_ref().map_or(Answer::CannotTell, |judged| judged.answer)
+    pub fn answer(&self) -> ComparisonAnswer {
+        self.judged.as_ref().map_or(ComparisonAnswer::CannotTell, |judged| judged.answer)
     }
 
     /// The answer in words.
@@ -138,17 +135,19 @@ impl Comparison {
         let shift = format!("a shift of mu' above {:.3} that all conditions share", judged.visible_shift);
         let mu0 = format!("a change of mu_0 above {:.1} %", 100.0 * judged.visible_mu0);
         match judged.answer {
-            Answer::Differ => format!(
+            ComparisonAnswer::Differ => format!(
                 "the runs differ in {} by more than their uncertainty explains",
                 judged.differ_in.join(" and ").replace("mu_relative", "mu'")
             ),
-            Answer::NoDifferenceSeen => format!(
+            ComparisonAnswer::NoDifferenceSeen => format!(
                 "no difference seen; with 90 % probability these would have been detected: {shift}, above {:.3} at one \
                  condition alone, {mu0}",
                 judged.visible_at_one
             ),
-            Answer::NotIndependent => "cannot tell: the runs are not independent of each other".into(),
-            Answer::CannotTell => format!(
+            ComparisonAnswer::NotIndependent => {
+                "cannot tell: the runs are not independent of each other".into()
+            }
+            ComparisonAnswer::CannotTell => format!(
                 "cannot tell: {} conditions in common, and only {shift}, or {mu0}, would have been detected",
                 self.pairs.len()
             ),
@@ -225,7 +224,7 @@ pub struct Judged {
     /// What differs: `mu_0`, `mu_relative`, both or nothing.
     pub differ_in: Vec<&'static str>,
     /// The answer.
-    pub answer: Answer,
+    pub answer: ComparisonAnswer,
 }
 
 impl Judged {
@@ -410,11 +409,11 @@ fn judge(pairs: &[Paired], references: &[Reference; 2]) -> Option<Judged> {
     let tested = [("mu_0", mu0_p), ("mu_relative", shift_p.min(scatter_p).min(furthest_p))];
     let differ_in: Vec<&str> = tested.into_iter().filter(|(_, p)| *p < EACH).map(|(name, _)| name).collect();
     let answer = if !differ_in.is_empty() {
-        Answer::Differ
+        ComparisonAnswer::Differ
     } else if pairs.len() >= ENOUGH_CONDITIONS && visible_shift.max(visible_mu0) <= VISIBLE_DEPARTURE {
-        Answer::NoDifferenceSeen
+        ComparisonAnswer::NoDifferenceSeen
     } else {
-        Answer::CannotTell
+        ComparisonAnswer::CannotTell
     };
     Some(Judged {
         mu0_p,

@@ -1,8 +1,8 @@
 //! What is left of a finger's hour of exposure, for whoever arms the rig.
 
-use crate::human::quantity;
+use crate::format::quantity;
 use crate::plan::{PassTimes, Point};
-use models::quantity::PeakToPeak;
+use models::PeakToPeak;
 use realtime::safety::{Exposed, Limits};
 use serde::{Deserialize, Serialize};
 

@@ -9,13 +9,12 @@ mod spectra;
 use crate::job::TARGET;
 use crate::plan::{Point, RenderPlan};
 use crate::run_dir::{open_record, records_in};
-use dynamics::{Dynamics, Part};
+use dynamics::{ChainStage, Dynamics};
 pub use lateness::Late;
 use miette::IntoDiagnostic;
-use models::target::Target;
-use realtime::cycle::{Command, Phase};
+use models::Target;
 use realtime::recorder::{self, Entry};
-use realtime::turn::Row;
+use realtime::{Command, Phase, Row};
 use serde::{Deserialize, Serialize};
 use spectra::Spectra;
 pub use spectra::{Bin, Corner};
@@ -30,7 +29,7 @@ pub const SCHEMA: &str = "muprime.fidelity/1";
 
 /// What a plan states of its rendering, and what is known of the rig at each drive frequency.
 #[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
-pub struct Stated {
+pub struct RenderingStatement {
     /// Difference of `mu'` that counts as rendered.
     pub tolerance: f64,
     /// Drive frequency in Hz, and the dynamics there.
@@ -42,7 +41,7 @@ pub struct Stated {
     pub period_m: Option<f64>,
 }
 
-impl Stated {
+impl RenderingStatement {
     /// Of the passes of a plan.
     pub fn of(
         render: &RenderPlan,
@@ -55,7 +54,12 @@ impl Stated {
         frequencies.dedup();
         let known = frequencies.into_iter().map(|f| (f, known(f))).collect();
         let grating = render.target == crate::plan::TargetKind::Grating;
-        Stated { tolerance: render.tolerance, known, remarks, period_m: render.period_m.filter(|_| grating) }
+        RenderingStatement {
+            tolerance: render.tolerance,
+            known,
+            remarks,
+            period_m: render.period_m.filter(|_| grating),
+        }
     }
 
     fn at(&self, frequency_hz: f64) -> Option<Dynamics> {
@@ -133,14 +137,14 @@ pub struct Group {
     /// The known dynamics.
     pub known: Option<Dynamics>,
     /// Its parts by name, the one that ends rendering first.
-    pub parts: Vec<Part>,
+    pub parts: Vec<ChainStage>,
     /// Means over the passes against position, forward and backward.
-    pub profiles: [Vec<Place>; 2],
+    pub profiles: [Vec<PlaceMeans>; 2],
 }
 
 /// Means over the passes of one direction at one place.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Serialize, Deserialize)]
-pub struct Place {
+pub struct PlaceMeans {
     /// Position in m.
     pub x_m: f64,
     /// Wanted `mu'`.
@@ -227,7 +231,7 @@ impl Collector {
     }
 
     /// What the rows come to.
-    pub fn finish(self, target: &Target, stated: &Stated, cycle_s: f64) -> Fidelity {
+    pub fn finish(self, target: &Target, stated: &RenderingStatement, cycle_s: f64) -> Fidelity {
         let mut keys: Vec<[f64; 3]> = self.passes.iter().map(|pass| pass.key).collect();
         keys.sort_by(|a, b| a.partial_cmp(b).expect("numbers"));
         keys.dedup();
@@ -249,7 +253,7 @@ fn group(
     [speed, load, hz]: [f64; 3],
     passes: &[&Rendered],
     target: &Target,
-    stated: &Stated,
+    stated: &RenderingStatement,
     cycle_s: f64,
 ) -> Group {
     let samples = || passes.iter().flat_map(|pass| &pass.samples);
@@ -313,7 +317,7 @@ fn group(
     }
 }
 
-fn profile(passes: &[&Rendered], forward: bool) -> Vec<Place> {
+fn profile(passes: &[&Rendered], forward: bool) -> Vec<PlaceMeans> {
     let samples = || passes.iter().filter(|p| p.forward == forward).flat_map(|p| &p.samples);
     let [low, high] =
         samples().fold([f64::INFINITY, f64::NEG_INFINITY], |[a, b], s| [a.min(s.x_m), b.max(s.x_m)]);
@@ -328,7 +332,7 @@ fn profile(passes: &[&Rendered], forward: bool) -> Vec<Place> {
     let mean = |(n, sums): &(f64, [f64; 6])| {
         let [x_m, wanted, commanded_pp_m, predicted, measured, square] = sums.map(|v| v / n);
         let measured_sd = (square - measured * measured).max(0.0).sqrt();
-        Place { x_m, wanted, commanded_pp_m, predicted, measured, measured_sd }
+        PlaceMeans { x_m, wanted, commanded_pp_m, predicted, measured, measured_sd }
     };
     places.iter().filter(|p| p.0 > 0.0).map(mean).collect()
 }
@@ -339,7 +343,7 @@ fn profile(passes: &[&Rendered], forward: bool) -> Vec<Place> {
 /// A record that cannot be opened; what is damaged is left out.
 pub fn of_run(folder: &Path) -> miette::Result<Option<Fidelity>> {
     let mut found = Collector::default();
-    let (mut stated, mut target, mut cycle_s) = (Stated::default(), None, 1e-3);
+    let (mut stated, mut target, mut cycle_s) = (RenderingStatement::default(), None, 1e-3);
     for path in records_in(folder)? {
         for entry in open_record(&path, recorder::CYCLES)? {
             match entry {

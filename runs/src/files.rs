@@ -105,7 +105,7 @@ fn put<T>(path: &Path, write: impl FnOnce(File) -> miette::Result<T>) -> miette:
     let moved = fresh(&part).into_diagnostic().and_then(|file| {
         let made = write(file.try_clone().into_diagnostic()?)?;
         file.sync_all().into_diagnostic()?;
-        Placed { file, path: part.clone() }.still_there()?;
+        GuardedFile { file, path: part.clone() }.still_there()?;
         fs::rename(&part, path).into_diagnostic().map(|()| made)
     });
     if moved.is_err() {
@@ -141,12 +141,12 @@ impl Drop for Made {
 /// An open file that knows its place: another program may remove or replace it at any time, and what is then
 /// written goes nowhere.
 #[derive(Debug)]
-pub struct Placed {
+pub struct GuardedFile {
     file: File,
     path: PathBuf,
 }
 
-impl Placed {
+impl GuardedFile {
     /// Opens a file as [`open_plain`] does; the name of a new one is safe when this returns.
     pub fn open(path: &Path, options: &mut OpenOptions) -> miette::Result<Self> {
         Self::of(path, || open_plain(path, options))
@@ -167,7 +167,7 @@ impl Placed {
             Ok::<_, io::Error>(file)
         };
         let file = open().into_diagnostic().wrap_err_with(|| path.display().to_string())?;
-        Ok(Placed { file, path: path.to_path_buf() })
+        Ok(GuardedFile { file, path: path.to_path_buf() })
     }
 
     /// The open file.
@@ -176,8 +176,8 @@ impl Placed {
     }
 
     /// Another handle of the same open file.
-    pub fn handle(&self) -> miette::Result<Placed> {
-        Ok(Placed { file: self.file.try_clone().into_diagnostic()?, path: self.path.clone() })
+    pub fn handle(&self) -> miette::Result<GuardedFile> {
+        Ok(GuardedFile { file: self.file.try_clone().into_diagnostic()?, path: self.path.clone() })
     }
 
     /// Makes the contents safe, and looks whether they are still where they belong.
@@ -203,13 +203,13 @@ impl Placed {
     }
 }
 
-impl Read for Placed {
+impl Read for GuardedFile {
     fn read(&mut self, into: &mut [u8]) -> io::Result<usize> {
         self.file.read(into)
     }
 }
 
-impl Write for Placed {
+impl Write for GuardedFile {
     fn write(&mut self, bytes: &[u8]) -> io::Result<usize> {
         self.file.write(bytes)
     }
@@ -218,7 +218,7 @@ impl Write for Placed {
     }
 }
 
-impl Seek for Placed {
+impl Seek for GuardedFile {
     fn seek(&mut self, to: SeekFrom) -> io::Result<u64> {
         self.file.seek(to)
     }
@@ -296,7 +296,7 @@ mod tests {
     fn a_file_that_was_removed_or_replaced_is_noticed() {
         let folder = folder("placed");
         let path = folder.join("run-1.mcap");
-        let open = || Placed::open(&path, OpenOptions::new().create(true).append(true)).unwrap();
+        let open = || GuardedFile::open(&path, OpenOptions::new().create(true).append(true)).unwrap();
         let mut file = open();
         file.write_all(b"row").unwrap();
         file.sync().unwrap();

@@ -2,7 +2,7 @@
 
 use crate::bundled;
 use crate::input::{self, BadInput};
-use models::finger::Finger;
+use models::Finger;
 use models::rig_file::{Calibration, PassNoise, RigFile, RigFileError};
 use serde::{Deserialize, Serialize};
 use std::path::Path;

@@ -1,6 +1,6 @@
 //! Reading files that people wrote: every refusal shows the place in the file and what would do.
 
-use crate::human::rounded;
+use crate::format::rounded;
 use crate::run_dir::{IDENTITY, RUN_AGAIN};
 use miette::{Diagnostic, NamedSource, SourceSpan};
 use models::rig_file::{RigFile, RigFileError};
@@ -260,7 +260,7 @@ pub fn in_si(text: &str) -> Cow<'_, str> {
             }
             DeValue::Array(list) => list.iter().for_each(|v| quantities(v, unit, found)),
             DeValue::String(text) if !unit.is_empty() && text.parse::<f64>().is_err() => {
-                found.extend(crate::quantity::parse(text, unit).map(|si| (value.span(), si)));
+                found.extend(crate::parse_quantity::parse(text, unit).map(|si| (value.span(), si)));
             }
             _ => {}
         }
@@ -329,7 +329,7 @@ pub fn as_list(text: &str, place: Option<Range<usize>>) -> Option<String> {
 /// What helps where a text is no TOML.
 fn of_syntax(text: &str, place: Option<Range<usize>>) -> String {
     let value = line_at(text, place).1.split_once('=');
-    let number = value.and_then(|(_, value)| crate::quantity::with_point(value));
+    let number = value.and_then(|(_, value)| crate::parse_quantity::with_point(value));
     number.filter(|number| number.parse::<f64>().is_ok()).map_or_else(
         || "a line of TOML is `key = value`, [table] or [[list]]; texts have quotation marks".into(),
         |number| format!("a number has a decimal point: {number}"),

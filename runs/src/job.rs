@@ -1,36 +1,36 @@
 //! A sweep from its job to its summary. Here in virtual time: in this thread, with the virtual rig's ports.
 //!
-//! The crate `rig` (rig/src/wall_run.rs) runs the same sequence in wall-clock time, with a thread for the
-//! loop and instruments behind drivers. Job, summary and [`RunWriter`], which writes the run's folder, serve both.
+//! The crate `rig` (rig/src/wall_clock_run.rs) runs the same sweep in wall-clock time, with a thread for
+//! the loop and instruments behind drivers. Job, summary and [`RunWriter`], which writes the run's folder, serve
+//! both.
 
-mod as_sent;
-mod fast;
+mod force_counts;
 pub mod licence;
 pub mod run_writer;
 mod telemetry;
+mod virtual_time;
 
-pub use fast::outcome_json;
 pub use run_writer::{REPLAYABLE, Replayable, RunWriter, TARGET, is_model, model_name, unix_ns};
 pub use telemetry::{Deadlines, Extremes, LATENESS_BOUNDS_S, Snapshot, Snapshots};
+pub use virtual_time::outcome_json;
 
-use crate::ambient::{Answers, LevelsFound};
-use crate::fidelity::Stated;
+use crate::ambient::{LevelsFound, OperatorAnswers};
+use crate::fidelity::RenderingStatement;
 use crate::fidelity::dynamics::Dynamics;
 use crate::plan::{Plan, Point, Resolution, lateral_reach};
 use crate::print::quoted;
 use crate::run_dir::{Identity, RunDir, SUMMARY};
-use crate::sequence::{Event, MeasuredPass, Outcome, PAUSE_MAX_S, Sequence, Zeros};
 use crate::setup::{Guards, Setup};
 use crate::supervisor::OffReport;
+use crate::sweep::{Event, MeasuredPass, Outcome, PAUSE_MAX_S, Sweep, Zeros};
 use calibration::certificate::sha256_hex;
 use models::law::Rendering;
-use models::prediction::FrictionModel;
 use models::psi_star::PsiStar;
-use models::target::Target;
+use models::{FrictionModel, Target};
+use realtime::Nanos;
 use realtime::clock::HeldBack;
 use realtime::compare::Agreement;
 use realtime::pacing::LoopReport;
-use realtime::ports::Nanos;
 use realtime::stall_monitor::StallReport;
 use serde::{Deserialize, Serialize};
 use std::collections::BTreeMap;
@@ -239,24 +239,24 @@ pub struct Begun {
     /// The run's folder.
     pub dir: RunDir,
     /// The passes that are left, in their order.
-    pub sequence: Sequence,
+    pub sweep: Sweep,
     /// Passes of the whole plan.
     pub planned: usize,
     /// Where this session begins on the run's clock in s.
     pub start_s: f64,
     /// Who answers for the person at the rig.
-    pub answers: Answers,
+    pub answers: OperatorAnswers,
 }
 
 impl Begun {
     /// Whether all passes were made in earlier sessions.
     pub fn is_complete(&self) -> bool {
-        self.sequence.progress().1 == 0
+        self.sweep.progress().1 == 0
     }
 
     /// The summary of a run that is complete: nothing is driven.
     pub fn finish(self, job: &Job) -> miette::Result<Summary> {
-        RunWriter::finish(job, self.dir, self.planned, self.sequence.agreement(true))
+        RunWriter::finish(job, self.dir, self.planned, self.sweep.agreement(true))
     }
 }
 
@@ -325,12 +325,14 @@ impl Job {
     }
 
     /// What the plan states of its rendering, and what is known of the rig. Errors: those of [`Job::points`].
-    pub fn stated(&self) -> miette::Result<Stated> {
+    pub fn stated(&self) -> miette::Result<RenderingStatement> {
         let points = self.plan.points(self.seed, &self.setup.config.limits, &self.resolution()?)?;
         let remarks = self.followed(&points)?.map(|(_, remarks)| remarks).unwrap_or_default();
         let known = |hz| Dynamics::of(&self.setup, hz);
         let render = self.plan.file.render.as_ref();
-        Ok(render.map_or_else(Stated::default, |render| Stated::of(render, &points, known, remarks)))
+        Ok(render.map_or_else(RenderingStatement::default, |render| {
+            RenderingStatement::of(render, &points, known, remarks)
+        }))
     }
 
     /// What the setup's amplifier can set, by its profile.
@@ -364,7 +366,7 @@ impl Job {
         self.notes = dir.notes().clone();
         let left = dir.left_of(points);
         let session = dir.plan_session(run_writer::unix_ns(), self.plan.file.pass.measure_s, self.fast);
-        let mut sequence = Sequence::new(
+        let mut sweep = Sweep::new(
             left,
             crate::plan::times(&self.setup.reaches()?, self.plan.file.pass),
             Arc::clone(&self.model),
@@ -373,17 +375,17 @@ impl Job {
         )
         .at_rig(&self.plan, &self.setup)
         .guarded_by(&self.setup.config.limits);
-        sequence.temperature_ranges.clone_from(&self.setup.certificates.temperature_ranges);
-        sequence.guards = self.setup.guards();
+        sweep.temperature_ranges.clone_from(&self.setup.certificates.temperature_ranges);
+        sweep.guards = self.setup.guards();
         let pause_max_s = self.setup.file.limits.pause_max_s.unwrap_or(PAUSE_MAX_S);
-        sequence.pause_max = Nanos::from_seconds(pause_max_s);
-        sequence.session = Some(session.session);
+        sweep.pause_max = Nanos::from_seconds(pause_max_s);
+        sweep.session = Some(session.session);
         // In virtual time the loop's own time goes on from session to session.
-        sequence.start_s = if self.fast { 0.0 } else { session.start_s };
+        sweep.start_s = if self.fast { 0.0 } else { session.start_s };
         for pass in &dir.made {
-            sequence.remember(pass);
+            sweep.remember(pass);
         }
-        Ok(Begun { dir, sequence, planned, start_s: session.start_s, answers })
+        Ok(Begun { dir, sweep, planned, start_s: session.start_s, answers })
     }
 
     /// Whether the run waits for a person at the rig.
@@ -409,7 +411,11 @@ impl Job {
         update: &mut dyn FnMut(Update<'_>),
     ) -> miette::Result<Summary> {
         let begun = self.begin()?;
-        if begun.is_complete() { begun.finish(&self) } else { fast::run(self, begun, signals, update) }
+        if begun.is_complete() {
+            begun.finish(&self)
+        } else {
+            virtual_time::run(self, begun, signals, update)
+        }
     }
 
     /// The world of the virtual rig; an error says why it cannot be.

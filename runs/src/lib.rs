@@ -1,20 +1,20 @@
 //! A friction sweep without an instrument: what people write, the order of the passes, virtual time, the run's folder, the report.
 //!
 //! No instrument and no loop in wall-clock time is here: the crate `rig` runs the same sweep over
-//! instruments. Downstream: `input` -> `setup`, `plan` -> `certificates` -> `sequence`, `supervisor` ->
+//! instruments. Downstream: `input` -> `setup`, `plan` -> `certificates` -> `sweep`, `supervisor` ->
 //! `job` -> `run_dir` -> `run_data` -> `report`.
 //!
 //! | module | purpose |
 //! |---|---|
-//! | [`input`], [`quantity`], [`files`] | files of people, refused with their place; units; files that are written |
-//! | [`human`] | quantities as people read them |
-//! | [`mod@print`], [`leave`], [`version`] | how the program prints, and ends; the build and its models |
+//! | [`input`], [`parse_quantity`], [`files`] | files of people, refused with their place; units; files that are written |
+//! | [`mod@format`] | quantities as people read them |
+//! | [`mod@print`], [`exit`], [`version`] | how the program prints, and ends; the build and its models |
 //! | [`setup`], [`plan`], [`fingertip`] | rigs, plans, fingertips, all checked with the place in the file |
 //! | [`bundled`] | those that come with the program, by name |
 //! | [`campaign`] | one plan with several tips, conditions and days: its sessions in their order |
 //! | [`certificates`], [`model_file`] | a setup's certificates, verified and applied once; a corrected model from its file to the loop |
 //! | [`profile_trial`] | a profile tried before any instrument is |
-//! | [`sequence`] | the steps of a sweep through its passes: a pure state machine over the loop's rows |
+//! | [`sweep`] | the steps of a sweep through its passes: a pure state machine over the loop's rows |
 //! | [`supervisor`] | the one way to lead a loop: stop first, switch off, read back; and the loop in virtual time |
 //! | [`job`] | a sweep from its job to its summary, in virtual time |
 //! | [`ambient`], [`exposure_left`] | levels of the air, set and read; what is left of a finger's exposure |
@@ -44,24 +44,30 @@ pub mod catalogue;
 pub mod certificates;
 pub mod compare;
 pub mod edges;
+pub mod exit;
 pub mod exposure_left;
 pub mod fidelity;
 pub mod files;
 pub mod fingertip;
-pub mod human;
+pub mod format;
 pub mod input;
 pub mod job;
-pub mod leave;
 pub mod model_file;
+pub mod parse_quantity;
 pub mod plan;
 pub mod print;
 pub mod profile_trial;
-pub mod quantity;
 pub mod report;
 pub mod run_data;
 pub mod run_dir;
-pub mod sequence;
 pub mod setup;
 pub mod supervisor;
+pub mod sweep;
 pub mod verdict_text;
 pub mod version;
+
+pub use job::{Job, Signals, Summary};
+pub use plan::Plan;
+pub use run_data::RunData;
+pub use setup::Setup;
+pub use sweep::{Event, MeasuredPass, Outcome, Sweep};

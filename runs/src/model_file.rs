@@ -4,12 +4,11 @@
 use crate::setup::Setup;
 use calibration::certificate::sha256_hex;
 use effects::corrected::{Corrected, SavedModel};
-use models::finger::Finger;
 use models::law::{BuiltIn, Named};
 use models::law_table::{ANSWERS, LawTable};
-use models::prediction::FrictionModel;
 use models::sparse::Sparse;
 use models::surrogate::{DEFAULT_TABLE, Surrogate};
+use models::{Finger, FrictionModel};
 use std::path::Path;
 use std::sync::Arc;
 

@@ -19,9 +19,8 @@ mod steps;
 mod visible;
 
 use crate::input::{self, BadInput, Problems};
-use models::condition::Condition;
 use models::covariate::{self, Covariate};
-use models::quantity::PeakToPeak;
+use models::{Condition, PeakToPeak};
 use serde::{Deserialize, Serialize};
 use std::collections::BTreeMap;
 use std::path::PathBuf;

@@ -1,11 +1,10 @@
 //! A profile tried before any instrument is: its vectors, then its own emulator's answers read for a second.
 
-use drivers::library::Source;
-use instruments::profile::FrameKind;
+use drivers::user_profiles::Source;
 use instruments::schema::Severity;
 use instruments::traffic::LineSetup;
-use instruments::{FrameId, Profile};
-use realtime::ports::Nanos;
+use instruments::{FrameId, FrameKind, Profile};
+use realtime::Nanos;
 use sim::wire::Plant;
 use sim::wire::device::Device;
 use sim::wire::world::WorldPlant;

@@ -6,12 +6,10 @@ pub mod remarks;
 
 use crate::fidelity::{self, Fidelity};
 use crate::input::rig_file;
-use crate::job::Summary;
 use crate::run_dir::{differences, missing_records, of_record, open_record, passes_in, records_in};
-use crate::sequence::{MeasuredPass, Outcome};
-use models::finger::Finger;
+use crate::{MeasuredPass, Outcome, Summary};
 use models::pass::coulomb_coefficient;
-use models::rig_file::PassNoise;
+use models::{Finger, PassNoise};
 use realtime::recorder::{self, Entry};
 use std::collections::BTreeMap;
 use std::path::Path;

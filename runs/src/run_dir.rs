@@ -9,10 +9,10 @@ mod lines;
 mod lock;
 mod record_facts;
 
-use crate::files::{self, Made, Placed, write_plain};
+use crate::files::{self, GuardedFile, Made, write_plain};
 use crate::job::Notes;
 use crate::plan::Point;
-use crate::sequence::MeasuredPass;
+use crate::sweep::MeasuredPass;
 use calibration::certificate::sha256_hex;
 pub use damage::{damage_in, differences, missing_records, of_record};
 pub use journal::passes_in;
@@ -83,8 +83,8 @@ pub struct Session {
 /// A run's folder, held by this process alone.
 pub struct RunDir {
     path: PathBuf,
-    points: Placed,
-    journal: Placed,
+    points: GuardedFile,
+    journal: GuardedFile,
     /// Held, and so locked, for as long as this lives: the system frees it with the process, whatever ends
     /// that.
     _lock: File,
@@ -179,7 +179,7 @@ impl RunDir {
         }
         let sessions = sessions_in(path)?;
         let open = |name: &str| {
-            let file = Placed::open(&path.join(name), OpenOptions::new().read(true).append(true))?;
+            let file = GuardedFile::open(&path.join(name), OpenOptions::new().read(true).append(true))?;
             let bytes = fs::read(path.join(name)).into_diagnostic().wrap_err_with(|| name.to_string())?;
             Ok::<_, miette::Report>((file, bytes))
         };
@@ -261,10 +261,10 @@ impl RunDir {
     }
 
     /// The record file of the session that has begun.
-    pub fn new_record(&self) -> miette::Result<Placed> {
+    pub fn new_record(&self) -> miette::Result<GuardedFile> {
         let number = self.sessions.last().map_or(1, |s| s.session);
         let path = self.path.join(format!("run-{number}.mcap"));
-        Placed::open(&path, OpenOptions::new().create_new(true).read(true).write(true))
+        GuardedFile::open(&path, OpenOptions::new().create_new(true).read(true).write(true))
     }
 
     /// Puts a pass into the point table and the journal, synced: after this it is never lost.
@@ -349,7 +349,7 @@ pub fn began(path: &Path) -> miette::Result<Option<String>> {
 }
 
 /// A power cut may leave part of a line at the end: it was never acknowledged and is cut off.
-fn cut_torn(file: &mut Placed, whole: usize, length: usize, name: &str) -> miette::Result<()> {
+fn cut_torn(file: &mut GuardedFile, whole: usize, length: usize, name: &str) -> miette::Result<()> {
     if whole == length {
         return Ok(());
     }

@@ -15,12 +15,12 @@ use crate::input::{self, Problems, unit_meant};
 use crate::plan::{LateralChannel, Reach};
 use drivers::vibrometer::VibrometerSetup;
 use drivers::{InstrumentSetup, InstrumentsSetup};
-use models::condition::Ambient;
+use models::Ambient;
 use models::rig_file::{PassNoise, RigFile, RigFileError};
+use realtime::Nanos;
 use realtime::cycle::Config;
 use realtime::estimate::{EstimateConfig, WINDOW_MAX};
 use realtime::pacing::Pacing;
-use realtime::ports::Nanos;
 use realtime::safety::Exposed;
 use serde::{Deserialize, Serialize};
 use std::path::{Path, PathBuf};
@@ -101,7 +101,7 @@ pub struct SetupFile {
     pub zero_counts: Option<[f64; 2]>,
     /// Present: this is a virtual rig, served on its instruments' loopback addresses by `muprime run` itself.
     #[serde(default, rename = "virtual")]
-    pub virtual_rig: Option<VirtualRig>,
+    pub virtual_rig: Option<VirtualRigConfig>,
 }
 
 impl SetupFile {
@@ -198,7 +198,7 @@ impl Pace {
 /// The embedded virtual rig.
 #[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize, schemars::JsonSchema)]
 #[serde(deny_unknown_fields, default)]
-pub struct VirtualRig {
+pub struct VirtualRigConfig {
     /// No departure from the model at all. Otherwise the bundled world, which departs by one sealed effect.
     pub ideal: bool,
     /// Seed of the finger's true stiffnesses about those that the setup states.
@@ -211,7 +211,7 @@ pub struct VirtualRig {
     pub hand_holds: bool,
 }
 
-impl VirtualRig {
+impl VirtualRigConfig {
     /// What its world is built from, but for defects that a command names.
     pub fn world(&self) -> sim::world::WorldConfig {
         let mut config =

@@ -1,18 +1,17 @@
 //! The only way to lead a loop: rigs in wall-clock and in virtual time are driven by [`sweep`].
 //!
-//! Two types implement [`Loop`]: [`VirtualLoop`] here, and `WallLoop` in the crate `rig`, which owns queue,
-//! lifeline, rings and links. Whatever ends a sweep (an orderly end, an error, a panic, a signal), the stop
-//! goes to the loop first, then the links switch off and read back. Only a drive that was read back off is
+//! Two types implement [`Loop`]: [`VirtualLoop`] here, and `WallClockLoop` in the crate `rig`, which owns
+//! queue, lifeline, rings and links. Whatever ends a sweep (an orderly end, an error, a panic, a signal), the
+//! stop goes to the loop first, then the links switch off and read back. Only a drive that was read back off is
 //! reported as off.
 
 mod virtual_time;
 
 pub use virtual_time::VirtualLoop;
 
-use crate::sequence::{Outcome, Reaction, Sequence};
-use drivers::{Closed, LinkEnd, Role};
-use realtime::cycle::Command;
-use realtime::turn::Row;
+use crate::sweep::{Outcome, Reaction, Sweep};
+use drivers::{Closed, LinkEnd, PortRole};
+use realtime::{Command, Row};
 use serde::{Deserialize, Serialize};
 
 /// The warning if the drive was not read back off.
@@ -53,13 +52,13 @@ pub struct Requests {
     pub pause: bool,
 }
 
-/// Feeds a sequence with the loop's rows and sends its commands, until it ends. `ask` returns the requests to
+/// Feeds a sweep with the loop's rows and sends its commands, until it ends. `ask` returns the requests to
 /// the sweep; `each` takes every row with what it led to, after the commands have left.
 pub fn sweep(
     rig: &mut impl Loop,
-    sequence: &mut Sequence,
+    sweep: &mut Sweep,
     ask: &mut dyn FnMut() -> Requests,
-    each: &mut dyn FnMut(&Row, &mut Sequence, Reaction),
+    each: &mut dyn FnMut(&Row, &mut Sweep, Reaction),
 ) -> Outcome {
     let mut instead = None;
     // Entered once for each pass and not for each row: in virtual time a row takes some microseconds.
@@ -69,7 +68,7 @@ pub fn sweep(
         if let Some(end) = requests.end {
             // Safe state first: the command goes out before anything else is looked at.
             rig.stop();
-            sequence.stop();
+            sweep.stop();
             let why = match end {
                 End::Requested => None,
                 End::NotSaved => Some(Outcome::RecordLost),
@@ -77,27 +76,27 @@ pub fn sweep(
             };
             instead = instead.or(why);
         }
-        sequence.pause(requests.pause);
+        sweep.pause(requests.pause);
         let Some(row) = rig.next_row() else {
             if rig.is_lost() {
                 return Outcome::LoopLost;
             }
             continue;
         };
-        if sequence.pass_under_way() != point {
+        if sweep.pass_under_way() != point {
             // The one before is left first.
             drop(span.take());
-            point = sequence.pass_under_way();
+            point = sweep.pass_under_way();
             span = point.map(|point| tracing::warn_span!("pass", point).entered());
         }
-        let mut reaction = sequence.on_row(&row);
+        let mut reaction = sweep.on_row(&row);
         for command in reaction.commands.drain(..) {
             if !rig.send(command) {
                 return Outcome::LoopLost;
             }
         }
         let outcome = reaction.outcome.clone();
-        each(&row, sequence, reaction);
+        each(&row, sweep, reaction);
         match outcome {
             Some(Outcome::Stopped) => return instead.unwrap_or(Outcome::Stopped),
             Some(outcome) => return outcome,
@@ -136,15 +135,17 @@ impl OffReport {
     /// From how the links were closed. A supply that was read back open switches the drive off, whatever its
     /// amplifier shows; one that was not takes nothing from an amplifier that was read back off.
     pub fn of(ends: &[LinkEnd]) -> Self {
-        let cut = ends.iter().any(|end| end.role == Role::Supply && end.closed == Closed::ReadBackOff);
+        let cut = ends.iter().any(|end| end.role == PortRole::Supply && end.closed == Closed::ReadBackOff);
         let not_off = |end: &LinkEnd| match &end.closed {
             Closed::NothingToSwitch | Closed::ReadBackOff => None,
-            Closed::NotReadBack(_) if end.role == Role::Supply || (cut && end.role == Role::Amplifier) => {
+            Closed::NotReadBack(_)
+                if end.role == PortRole::Supply || (cut && end.role == PortRole::Amplifier) =>
+            {
                 None
             }
             Closed::NotReadBack(why) => Some(NotOff {
                 instrument: end.name.clone(),
-                drives: end.role == Role::Amplifier,
+                drives: end.role == PortRole::Amplifier,
                 why: why.clone(),
             }),
         };
@@ -169,33 +170,33 @@ impl OffReport {
 mod tests {
     use super::*;
 
-    fn end(role: Role, closed: Closed) -> LinkEnd {
+    fn end(role: PortRole, closed: Closed) -> LinkEnd {
         LinkEnd { name: "x".into(), role, closed }
     }
 
     #[test]
     fn off_is_said_only_of_what_was_read_back() {
         let off = OffReport::of(&[
-            end(Role::Force, Closed::NothingToSwitch),
-            end(Role::Amplifier, Closed::ReadBackOff),
+            end(PortRole::Force, Closed::NothingToSwitch),
+            end(PortRole::Amplifier, Closed::ReadBackOff),
         ]);
         assert!(off.read_back && off.words().contains("is off"));
         let on = OffReport::of(&[
-            end(Role::Stage, Closed::ReadBackOff),
-            end(Role::Amplifier, Closed::NotReadBack("silent".into())),
+            end(PortRole::Stage, Closed::ReadBackOff),
+            end(PortRole::Amplifier, Closed::NotReadBack("silent".into())),
         ]);
         assert!(!on.read_back && on.words().contains(MAY_BE_ON) && on.words().contains("silent"), "{on:?}");
         let cut = OffReport::of(&[
-            end(Role::Amplifier, Closed::NotReadBack("dead".into())),
-            end(Role::Supply, Closed::ReadBackOff),
+            end(PortRole::Amplifier, Closed::NotReadBack("dead".into())),
+            end(PortRole::Supply, Closed::ReadBackOff),
         ]);
         assert!(cut.read_back, "an open supply is off: {cut:?}");
         let welded = OffReport::of(&[
-            end(Role::Amplifier, Closed::NotReadBack("dead".into())),
-            end(Role::Supply, Closed::NotReadBack("welded".into())),
+            end(PortRole::Amplifier, Closed::NotReadBack("dead".into())),
+            end(PortRole::Supply, Closed::NotReadBack("welded".into())),
         ]);
         assert!(!welded.read_back && welded.words().contains(MAY_BE_ON), "{welded:?}");
-        let moves = OffReport::of(&[end(Role::Stage, Closed::NotReadBack("silent".into()))]);
+        let moves = OffReport::of(&[end(PortRole::Stage, Closed::NotReadBack("silent".into()))]);
         assert!(!moves.words().contains("is off") && moves.words().contains("may still move"), "{moves:?}");
         assert!(!OffReport::default().read_back, "nothing known is not 'off'");
     }

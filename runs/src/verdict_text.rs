@@ -2,16 +2,15 @@
 
 pub mod files;
 
-use crate::human::{quantity, with_interval};
-use diagnosis::certificates;
-use diagnosis::format::{plain, probability};
-use diagnosis::intervals::{Estimate, Shape};
-use diagnosis::locate::Region;
-use diagnosis::verdict::{Diagnosis, Hypothesis};
+use crate::format::{quantity, with_interval};
+use diagnosis::report::certificates;
+use diagnosis::report::format::{plain, probability};
+use diagnosis::report::intervals::{Estimate, Shape};
+use diagnosis::report::locate::Region;
+use diagnosis::{Diagnosis, Hypothesis};
 use miette::IntoDiagnostic;
-use models::condition::Condition;
 use models::covariate::{self, Covariate};
-use models::rig_file::RigFile;
+use models::{Condition, RigFile};
 use std::path::PathBuf;
 
 /// Parts of the operating space that are named, the largest first.
@@ -51,7 +50,7 @@ pub fn next_plan(result: &Diagnosis, continues: &[PathBuf]) -> Option<String> {
 
 /// The plan of a designed experiment, one series with a name a condition: those that tell most first, grouped
 /// by pressure, since a chamber is changed once. It names the runs that it continues.
-pub fn plan(experiment: &diagnosis::next::Experiment, continues: &[PathBuf]) -> String {
+pub fn plan(experiment: &diagnosis::report::next::Experiment, continues: &[PathBuf]) -> String {
     let mut conditions = experiment.conditions.clone();
     let pressure = |c: &Condition| c.ambient_pressure_pa.unwrap_or(0.0);
     conditions.sort_by(|a, b| pressure(b).total_cmp(&pressure(a)));
@@ -200,11 +199,9 @@ pub fn terminal(result: &Diagnosis) -> String {
 mod tests {
     use super::{plan, probability};
     use crate::plan::{Plan, Resolution};
-    use diagnosis::next::Experiment;
-    use models::condition::Condition;
-    use models::quantity::{Direction, PeakToPeak};
-    use realtime::ports::Nanos;
-    use realtime::safety::Limits;
+    use diagnosis::report::next::Experiment;
+    use models::{Condition, Direction, PeakToPeak};
+    use realtime::{Limits, Nanos};
     use std::path::PathBuf;
 
     #[test]

@@ -4,9 +4,9 @@
 //! world in 1 ms is a factor of a thousand.
 
 use divan::{Bencher, black_box};
-use models::quantity::PeakToPeak;
+use models::PeakToPeak;
 use muprime_sim::amplifier::AmplifierInput;
-use muprime_sim::contact::{Contact, Recovery};
+use muprime_sim::contact::{Contact, StretchRecovery};
 use muprime_sim::defects::Defects;
 use muprime_sim::stage::StageInput;
 use muprime_sim::virtual_rig::VirtualRig;
@@ -81,7 +81,7 @@ fn steady_exact(bencher: Bencher) {
 #[divan::bench]
 fn steady_sampled(bencher: Bencher) {
     let mut contact = contact();
-    contact.recovery = Recovery::Rate(5e-3);
+    contact.recovery = StretchRecovery::Rate(5e-3);
     bencher.bench(|| black_box(contact).steady());
 }
 

@@ -4,8 +4,8 @@
 //! the output off by itself and stays off until commanded off and on again. The supply relay is a second,
 //! independent way to switch off: it works even where the amplifier refuses its enable.
 
-use models::quantity::PeakToPeak;
-use realtime::ports::Nanos;
+use models::PeakToPeak;
+use realtime::Nanos;
 use serde::{Deserialize, Serialize};
 
 /// What the amplifier is.

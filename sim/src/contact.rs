@@ -3,8 +3,8 @@
 //! Three solvers, one set of parameters:
 //! * [`element`]: a massless linear element, exactly, event by event. It serves where nothing but the paper's
 //!   own assumptions acts.
-//! * [`sampled`]: a massless element with any of the [`Limit`], [`Recovery`] and [`Motion`] terms, marched
-//!   through the cycle's contact phase on a fine grid until it repeats.
+//! * [`sampled`]: a massless element with any of the [`Limit`], [`StretchRecovery`] and [`Motion`] terms,
+//!   marched through the cycle's contact phase on a fine grid until it repeats.
 //! * [`resolved`]: a ridge with mass and damping, which flies, lands and sticks; marched through many cycles.
 //!
 //! [`Contact::steady`] picks the cheapest one that holds everything requested. [`averaged`] keeps the
@@ -55,7 +55,7 @@ impl Limit {
 
 /// How the lateral stretch of a ridge recovers once nothing holds it.
 #[derive(Clone, Copy, Debug, PartialEq, Default)]
-pub enum Recovery {
+pub enum StretchRecovery {
     /// At once: the paper's section 4.
     #[default]
     Instant,
@@ -120,7 +120,7 @@ pub struct Contact {
     /// Friction limit beyond Coulomb's.
     pub limit: Limit,
     /// Lateral recovery.
-    pub recovery: Recovery,
+    pub recovery: StretchRecovery,
     /// Motion of the plate beyond a sine.
     pub motion: Motion,
     /// Ridges beyond massless springs.
@@ -167,7 +167,7 @@ impl Contact {
             frequency_hz,
             speed_m_s,
             limit: Limit::default(),
-            recovery: Recovery::Instant,
+            recovery: StretchRecovery::Instant,
             motion: Motion::default(),
             ridge: Ridge::default(),
         }
@@ -198,7 +198,7 @@ impl Contact {
             return resolved::steady(self, resolved::Settings::default()).steady;
         }
         let plain = self.limit == Limit::default()
-            && self.recovery == Recovery::Instant
+            && self.recovery == StretchRecovery::Instant
             && self.motion == Motion::default();
         match (plain, self.ridge.height_sd_m > 0.0) {
             (true, false) => self.steady_element(),

@@ -18,7 +18,7 @@ pub use file::{Defects, DefectsError};
 /// Where a defect sits.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, serde::Serialize)]
 #[serde(rename_all = "snake_case")]
-pub enum Location {
+pub enum DefectSite {
     /// Between finger and plate.
     Contact,
     /// In the fingertip.
@@ -106,7 +106,7 @@ pub struct DefectKind {
     /// Its name: the effect's, where the library has one for the same cause.
     pub name: &'static str,
     /// Where it sits.
-    pub place: Location,
+    pub place: DefectSite,
     /// Whether an effect of that name exists.
     pub in_library: bool,
     /// Whether a table of steady passes can show it.
@@ -123,14 +123,14 @@ pub struct DefectKind {
 
 impl DefectKind {
     /// A cause that a table of steady passes shows and the library has an effect for.
-    const fn cause(place: Location, summary: &'static str) -> Self {
+    const fn cause(place: DefectSite, summary: &'static str) -> Self {
         let (act, parameters) = (Act::Setup(|_, _| {}), [].as_slice());
         let (name, in_library, in_tables, imitated) = ("", true, true, false);
         DefectKind { name, place, in_library, in_tables, imitated, summary, parameters, act }
     }
 
     /// A fault of the rig, which is none of the causes that a table shows.
-    const fn fault(place: Location, summary: &'static str) -> Self {
+    const fn fault(place: DefectSite, summary: &'static str) -> Self {
         DefectKind { in_library: false, in_tables: false, ..Self::cause(place, summary) }
     }
 

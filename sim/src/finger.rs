@@ -3,7 +3,7 @@
 //! At ultrasonic frequencies the ridges stand on an immobile backing: normal and lateral springs, perhaps
 //! with mass and damping. At the stage's pace the pad is a soft lateral spring: a reversal first unwinds it.
 
-use crate::contact::{Contact, Recovery, Ridge};
+use crate::contact::{Contact, Ridge, StretchRecovery};
 use crate::noise::Noise;
 use serde::{Deserialize, Serialize};
 
@@ -66,7 +66,7 @@ pub struct Finger {
     /// True coefficient of friction (-).
     pub mu0: f64,
     ridge: Ridge,
-    recovery: Recovery,
+    recovery: StretchRecovery,
 }
 
 impl Finger {
@@ -88,8 +88,8 @@ impl Finger {
                 ..Ridge::default()
             },
             recovery: match config.lateral_recovery_m_s {
-                speed if speed > 0.0 => Recovery::Rate(speed),
-                _ => Recovery::Instant,
+                speed if speed > 0.0 => StretchRecovery::Rate(speed),
+                _ => StretchRecovery::Instant,
             },
         }
     }

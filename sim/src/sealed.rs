@@ -27,9 +27,8 @@ use crate::defects::{ALL, Defect, DefectKind, Defects, compatible};
 use crate::noise::Noise;
 use design::{Design, Planned};
 use imitate::Imitator;
-use models::condition::Condition;
-use models::pass::Pass;
-use oracle::{Case, Fit};
+use models::{Condition, Pass};
+use oracle::{Case, ImitationFit};
 use serde::{Deserialize, Serialize};
 pub use set_maker::SetNoise;
 use set_maker::{GAP, SetMaker};
@@ -290,7 +289,7 @@ pub fn generate_with_rig(seed: u64, stratum: Stratum, ask: Ask) -> (Set, SealedR
 fn imitations(
     case: &Case<'_>,
     causes: &[Defect],
-    base: &Fit,
+    base: &ImitationFit,
     truth_chi2: f64,
     whole: bool,
 ) -> (Option<f64>, Vec<Imitator>) {

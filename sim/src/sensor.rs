@@ -2,7 +2,7 @@
 //! a sample counter and a clock of its own.
 
 use crate::noise::{Noise, Wander};
-use realtime::ports::Nanos;
+use realtime::Nanos;
 use serde::{Deserialize, Serialize};
 
 /// What the sensor is.

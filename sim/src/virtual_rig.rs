@@ -9,7 +9,7 @@ use crate::sensor::ForceSample;
 use crate::stage::StageInput;
 use crate::world::{ConfigError, World, WorldConfig};
 use realtime::ports::{
-    Amplifier, AmplifierState, Channel, Contact, Contacts, ForceSensor, Forces, Nanos, NoData, Quality,
+    Amplifier, AmplifierState, Channel, Contacts, ForceSensor, Forces, Nanos, NoData, Quality, SafetyContact,
     SafetyInputs, Sample, Stage, StageState, SupplyCommand, SupplyState, SupplySwitch,
 };
 use realtime::safety::{DriveCommand, StageCommand};
@@ -113,7 +113,7 @@ impl SafetyInputs for VirtualRig {
     fn read(&mut self, now: Nanos) -> Contacts {
         self.world.advance_to(now);
         let (operator, taken_at) = (self.world.operator, self.world.now());
-        let contact = |closed| Ok(Contact { closed, taken_at, sequence: taken_at.0 as u32 });
+        let contact = |closed| Ok(SafetyContact { closed, taken_at, sequence: taken_at.0 as u32 });
         Contacts {
             emergency_stop: contact(!operator.presses_emergency_stop),
             interlock: contact(!operator.opens_guard),

@@ -34,8 +34,7 @@ pub mod world;
 
 pub use quantity::{Command, Quantity};
 
-use realtime::clock::Clock;
-use realtime::ports::Nanos;
+use realtime::{Clock, Nanos};
 use std::io;
 use std::sync::atomic::{AtomicBool, Ordering};
 use std::sync::{Arc, Mutex, MutexGuard};

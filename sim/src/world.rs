@@ -22,7 +22,7 @@ use crate::amplifier::{Amplifier, AmplifierInput, AmplifierStatus};
 use crate::channel::{ChannelName, Gate};
 use crate::contact::averaged::Averager;
 use crate::contact::resolved::March;
-use crate::contact::{Contact, Motion, Recovery, Steady};
+use crate::contact::{Contact, Motion, Steady, StretchRecovery};
 use crate::defects::{Forces, Surroundings};
 use crate::finger::{Finger, Pad};
 use crate::noise::Noise;
@@ -239,7 +239,7 @@ impl World {
         // Only mass and late recovery carry anything from one cycle to the next; the march knows them for one
         // ridge on a plain sine. Every other contact is periodic from its first cycle: its steady state is
         // its every cycle.
-        let remembers = contact.has_inertia() || contact.recovery != Recovery::Instant;
+        let remembers = contact.has_inertia() || contact.recovery != StretchRecovery::Instant;
         let plain = contact.motion == Motion::default() && contact.ridge.height_sd_m == 0.0;
         let steady = if self.config.contact == ContactMode::Averaged {
             self.averager.steady(&contact)

@@ -1,7 +1,7 @@
 //! The contact against outside truths: published limits, and figures of an independent computation.
 
 use muprime_sim::contact::resolved::March;
-use muprime_sim::contact::{Contact, Recovery};
+use muprime_sim::contact::{Contact, StretchRecovery};
 
 /// w/h, then mu' at Psi (Eq. 17) = 0.1, 0.25, 0.5, 1, 2, 3, 4.5, 2 pi: a massless time-domain computation
 /// that shares no code with this one.
@@ -70,7 +70,8 @@ fn figure_13_and_14_recovery() {
     ] {
         for (v_r, expected) in rows {
             let mut contact = Contact::ideal(3.9e6, 1.5e6, 0.5, 0.5, amplitude, 27_500.0, 0.02);
-            contact.recovery = if f64::is_finite(v_r) { Recovery::Rate(v_r) } else { Recovery::Instant };
+            contact.recovery =
+                if f64::is_finite(v_r) { StretchRecovery::Rate(v_r) } else { StretchRecovery::Instant };
             let got = mu_relative(&contact);
             println!("a {amplitude} v_r {v_r}: {got} (reference {expected})");
             let tolerance = if v_r == 5e-3 { 0.015 } else { 0.004 };
@@ -112,7 +113,7 @@ fn figure_13_friction_first_drops_and_then_climbs() {
     // Recovery at 1.5 mm/s, Eq. 14 read literally: stretch is left over from contact to contact, and friction climbs over
     // tens of cycles to slightly less than that of slip during the whole contact (0.957 by an independent computation).
     let mut contact = Contact::ideal(3.9e6, 1.5e6, 0.5, 0.5, 5e-6, 27_500.0, 0.02);
-    contact.recovery = Recovery::Rate(1.5e-3);
+    contact.recovery = StretchRecovery::Rate(1.5e-3);
     contact.ridge.damping_n_s_per_m = 0.02;
     let mut march = March::new(&contact, 1000);
     let forces: Vec<f64> = (0..150).map(|_| march.cycle(&contact).lateral_n / 0.25).collect();

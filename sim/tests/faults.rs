@@ -1,11 +1,11 @@
 //! Faults of the rig's devices, as the world lives through them.
 
-use models::quantity::PeakToPeak;
+use models::PeakToPeak;
 use muprime_sim::amplifier::AmplifierInput;
 use muprime_sim::defects::Defects;
 use muprime_sim::stage::StageInput;
 use muprime_sim::world::{World, WorldConfig};
-use realtime::ports::Nanos;
+use realtime::Nanos;
 
 fn world(defects: &str) -> World {
     let defects = Defects::parse(defects).unwrap();

@@ -1,7 +1,7 @@
 //! The oracle's imitations against what is known from outside: the groups of gains that the closed forms of the paper
 //! cannot tell apart (k_n w / F and k_l U / (f mu0 k_n w) are all that mu' depends on), and causes of different kinds.
 
-use models::quantity::PeakToPeak;
+use models::PeakToPeak;
 use muprime_sim::defects::{Defect, DefectKind, Defects, Surroundings};
 use muprime_sim::finger::{Finger, FingerConfig};
 use muprime_sim::sealed::imitate::Imitator;

@@ -3,7 +3,7 @@
 use std::alloc::{GlobalAlloc, Layout, System};
 use std::cell::Cell;
 
-use models::quantity::PeakToPeak;
+use models::PeakToPeak;
 use muprime_sim::amplifier::AmplifierInput;
 use muprime_sim::stage::StageInput;
 use muprime_sim::virtual_rig::VirtualRig;

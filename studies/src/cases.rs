@@ -12,7 +12,7 @@
 //! | `shard` | the one format of results: Parquet with its schema and its provenance |
 //! | `gather` | all shards as one table, the same bytes whoever ran them; refuses holes, contradictions, mixed versions |
 //! | `plan` | what is missing, measured and cut into ranges; how much memory a task needs |
-//! | `share` | the part of one task of an engine that knows nothing of cases |
+//! | `task_range` | the part of one task of an engine that knows nothing of cases |
 //! | `submit` | hands ranges to an engine, follows what comes into the folder, goes on, cancels |
 //! | `engines` | one file an engine |
 //! | [`adaptive`] | a surrogate whose nodes are chosen where the error is |
@@ -33,10 +33,10 @@ pub mod run;
 #[cfg(feature = "cases")]
 pub mod shard;
 #[cfg(feature = "cases")]
-pub mod share;
-#[cfg(feature = "cases")]
 pub mod study;
 #[cfg(feature = "cases")]
 pub mod submit;
+#[cfg(feature = "cases")]
+pub mod task_range;
 #[cfg(feature = "cases")]
 pub mod worker;

@@ -13,7 +13,7 @@ pub use collapse::collapse;
 use miette::{IntoDiagnostic, miette};
 use models::ridge::study::{Panel, StudyPoint, content_key, fig_9_at};
 use models::ridge::{self, Cycle, RidgeCase, RidgeRun, RunSettings};
-use plot::{Chart, Series, Stated};
+use plot::{Chart, PaperMark, Series};
 use reading::Reading;
 use runs::report::plots::ends;
 use std::path::Path;
@@ -135,8 +135,10 @@ pub fn phase_shift(base: RidgeCase, out: &Path, reading: Reading) -> miette::Res
     let chart = |name: &str, title: &str, moduli: [f64; 4], transition: [f64; 2]| {
         let series = moduli.map(|e| Series::line(format!("E_sc {} MPa", e / 1e6), curve(e))).into();
         let axes = [reading::column(reading), "phase_shift_deg"];
-        let stated =
-            vec![Stated::Span(transition, "transition (paper)"), Stated::Level(90.0, "plateau (paper)")];
+        let stated = vec![
+            PaperMark::Span(transition, "transition (paper)"),
+            PaperMark::Level(90.0, "plateau (paper)"),
+        ];
         Chart { stated, ..Chart::new(reading::file(reading, name), title, axes, series) }
     };
     let mut lines = Vec::new();
@@ -231,7 +233,7 @@ pub fn reaction_force(base: RidgeCase, reading: Reading) -> miette::Result<Repro
     }
     lines.push("paper: always positive at 0.1 \u{b5}m, zero for a significant time at 1 \u{b5}m and longer at 2 \u{b5}m, the greatest force growing, the mean equal to the applied 0.25 N".into());
     let (name, axes) = (reading::file(reading, "fig7"), ["time_periods", "reaction_force_n"]);
-    let stated = vec![Stated::Level(base.normal_force_n, "applied (paper)")];
+    let stated = vec![PaperMark::Level(base.normal_force_n, "applied (paper)")];
     let chart = Chart::new(name, "Reaction force of the finger (Fig. 7)", axes, series);
     Ok(Reproduced { charts: vec![Chart { stated, ..chart }], lines })
 }

@@ -2,7 +2,7 @@
 
 use indicatif::{ProgressBar, ProgressDrawTarget, ProgressStyle};
 use miette::IntoDiagnostic;
-use runs::leave::leave_now;
+use runs::exit::exit_now;
 use runs::say;
 use std::io::IsTerminal;
 use std::sync::atomic::AtomicBool;
@@ -49,7 +49,7 @@ pub fn on_interrupt(bar: &ProgressBar, partial: impl FnOnce(u64) + Send + 'stati
         watching = on_signals(&[signal_hook::consts::SIGINT], move || {
             let at_work = AT_WORK.lock().unwrap_or_else(PoisonError::into_inner).take();
             let Some((bar, partial)) = at_work.filter(|_| std::mem::take(&mut is_first)) else {
-                return leave_now(INTERRUPTED);
+                return exit_now(INTERRUPTED);
             };
             let position = bar.position();
             bar.finish_and_clear();
@@ -57,10 +57,10 @@ pub fn on_interrupt(bar: &ProgressBar, partial: impl FnOnce(u64) + Send + 'stati
             // Printing it may take long, or fail: the next Ctrl-C does not wait for it.
             let thread = std::thread::Builder::new().name("partial".into()).spawn(move || {
                 partial(position);
-                leave_now(INTERRUPTED);
+                exit_now(INTERRUPTED);
             });
             if thread.is_err() {
-                leave_now(INTERRUPTED);
+                exit_now(INTERRUPTED);
             }
         })
     });

@@ -18,13 +18,13 @@ mod tables;
 mod tests;
 
 use calibration::certificate::{
-    Certificate, CertificateKind, Circumstances, Instrument, Occasion, Outcome, Parameter, RawData, Verified,
-    date,
+    CalibrationResult, Certificate, CertificateKind, Circumstances, Instrument, Occasion, Parameter, RawData,
+    Verified, date,
 };
 use drivers::vibrometer::Settings;
 use miette::IntoDiagnostic;
-use models::quantity::PeakToPeak;
-use runs::setup::Setup;
+use models::PeakToPeak;
+use runs::Setup;
 use serde_json::json;
 use std::path::{Path, PathBuf};
 use std::time::{SystemTime, UNIX_EPOCH};
@@ -303,7 +303,7 @@ impl Common {
         })
     }
 
-    fn certify(&self, outcome: Outcome, raw: RawData) -> miette::Result<Issued> {
+    fn certify(&self, outcome: CalibrationResult, raw: RawData) -> miette::Result<Issued> {
         let origin = raw.origin.clone();
         let certificate = outcome.certify(&self.occasion(raw)?);
         // What `check` would refuse is not issued.

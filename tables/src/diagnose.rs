@@ -4,14 +4,11 @@ use crate::import::{never_lifts, points, remarks_of};
 use crate::law::Loaded;
 use crate::passes::parse_passes;
 use calibration::certificate::sha256_hex;
+use diagnosis::base_law::{BaseLaw, CannotTell};
 use diagnosis::data::{DataError, Table};
-use diagnosis::hypotheses::Options;
-use diagnosis::law::{BaseLaw, CannotTell};
-use diagnosis::verdict::{Diagnosis, diagnose};
+use diagnosis::{Diagnosis, Options, diagnose};
 use miette::{IntoDiagnostic, WrapErr};
-use models::law::BuiltIn;
-use models::pass::Pass;
-use models::rig_file::RigFile;
+use models::{BuiltIn, Pass, RigFile};
 use runs::edges::add_record;
 use runs::input::{MAX_TABLE_BYTES, bytes_of, rig_file};
 use runs::report::diagnosis::page;
@@ -137,8 +134,7 @@ pub fn diagnose_run(run: &Path) -> miette::Result<()> {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use models::condition::Condition;
-    use models::quantity::Direction;
+    use models::{Condition, Direction};
 
     /// A pass without a force, and a unit that has slipped, are remarked on with the verdict, not by `check` alone.
     #[test]

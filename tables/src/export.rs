@@ -35,7 +35,7 @@ left_out!(hdf5 without "matlab");
 left_out!(parquet without "parquet");
 
 use clap::ValueEnum;
-use runs::run_data::RunData;
+use runs::RunData;
 use std::path::{Path, PathBuf};
 
 /// A format to export to. Add one: a file in `export/`, a variant, and a line in [`export`].
@@ -74,7 +74,7 @@ impl Format {
 /// # Errors
 /// Whatever the format's library says; a build without Arrow.
 pub fn arrow_bytes(run: &RunData) -> miette::Result<Vec<u8>> {
-    arrow::bytes(&columns::of(&run.passes), &facts::of(run, &facts::Stated::default()))
+    arrow::bytes(&columns::of(&run.passes), &facts::of(run, &facts::ExportFacts::default()))
 }
 
 /// The cycles of a run's records as an Arrow IPC file in memory: session, loop time, and a column for each
@@ -84,7 +84,7 @@ pub fn arrow_bytes(run: &RunData) -> miette::Result<Vec<u8>> {
 /// # Errors
 /// A record that cannot be read; a build without Arrow.
 pub fn cycles_bytes(folder: &Path, run: &RunData, points: &[u32]) -> miette::Result<Vec<u8>> {
-    arrow::bytes(&cycles::of(folder, points)?, &facts::of(run, &facts::Stated::default()))
+    arrow::bytes(&cycles::of(folder, points)?, &facts::of(run, &facts::ExportFacts::default()))
 }
 
 /// What was exported.
@@ -106,7 +106,7 @@ pub fn export(
     folder: &Path,
     run: &RunData,
     format: Format,
-    stated: &facts::Stated,
+    stated: &facts::ExportFacts,
     to: Option<&Path>,
 ) -> miette::Result<Exported> {
     let facts = facts::of(run, stated);

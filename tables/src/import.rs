@@ -27,8 +27,7 @@ mod write;
 
 use calibration::certificate::sha256_hex;
 use map::Map;
-use models::pass::Pass;
-use models::rig_file::RigFile;
+use models::{Pass, RigFile};
 use series::Spread;
 use targets::Id;
 use values::{Dropped, Values};

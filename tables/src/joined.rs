@@ -1,11 +1,11 @@
 //! Several runs or tables of one rig as one table: a run, and the further passes that its verdict wants.
 
-use models::pass::Pass;
+use models::Pass;
 use runs::run_dir::sessions_in;
 use std::path::Path;
 
 /// A run or table among others.
-pub struct Part {
+pub struct JoinedTable {
     /// Its folder or file, as the user gave it.
     pub name: String,
     /// Its passes.
@@ -28,7 +28,7 @@ pub fn start_of(run: &Path) -> Option<f64> {
 ///
 /// # Errors
 /// The same passes twice.
-pub fn joined(mut parts: Vec<Part>) -> miette::Result<Vec<Pass>> {
+pub fn joined(mut parts: Vec<JoinedTable>) -> miette::Result<Vec<Pass>> {
     if parts.len() == 1 {
         return Ok(parts.remove(0).passes);
     }
@@ -64,14 +64,14 @@ pub fn joined(mut parts: Vec<Part>) -> miette::Result<Vec<Pass>> {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use models::condition::Condition;
+    use models::Condition;
 
-    fn part(name: &str, start_unix_s: Option<f64>, times: [f64; 2]) -> Part {
+    fn part(name: &str, start_unix_s: Option<f64>, times: [f64; 2]) -> JoinedTable {
         let pass = |k: u64, time_s| Pass::at(k, &Condition { time_s, ..Condition::paper() }, Some(0.1));
-        Part { name: name.into(), start_unix_s, passes: vec![pass(7, times[0]), pass(12, times[1])] }
+        JoinedTable { name: name.into(), start_unix_s, passes: vec![pass(7, times[0]), pass(12, times[1])] }
     }
 
-    fn seen(parts: Vec<Part>) -> Vec<(String, u64, f64)> {
+    fn seen(parts: Vec<JoinedTable>) -> Vec<(String, u64, f64)> {
         joined(parts).unwrap().into_iter().map(|p| (p.run.unwrap_or_default(), p.point, p.time_s)).collect()
     }
 
@@ -96,7 +96,7 @@ mod tests {
     /// A run that has no pass yet takes no time from those around it.
     #[test]
     fn a_part_without_passes_changes_nothing() {
-        let empty = Part { name: "c".into(), passes: Vec::new(), start_unix_s: None };
+        let empty = JoinedTable { name: "c".into(), passes: Vec::new(), start_unix_s: None };
         let all = seen(vec![part("a", None, [1.0, 50.0]), empty, part("b", None, [0.5, 60.0])]);
         assert_eq!((all[2].1, all[2].2), (207, 50.0));
     }

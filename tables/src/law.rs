@@ -4,16 +4,15 @@
 use crate::import::{as_csv, is_parquet};
 use calibration::certificate::sha256_hex;
 use miette::{Context, IntoDiagnostic};
-use models::finger::Finger;
 use models::law::{BuiltIn, Named};
 use models::law_table::grid::Tabulated;
 use models::law_table::{OF_LAWS, VARIABLES, Variable};
 use models::pass::{Pass, coulomb_coefficient};
-use models::prediction::FrictionModel;
+use models::{Finger, FrictionModel};
+use runs::Setup;
 use runs::input::bytes_of;
 use runs::job::model_name;
 use runs::model_file::{HASH_MARK, built_in, hashed, law, load_for};
-use runs::setup::Setup;
 use std::path::Path;
 use std::sync::Arc;
 

@@ -6,12 +6,12 @@
 //! noise-free forces, refitted with the stated deviations: an imitator that it does not find is not counted.
 
 use diagnosis::data::{RigFile, Table};
-use diagnosis::evidence::Posterior;
-use diagnosis::fitted::Fitted;
+use diagnosis::hypotheses::fitted::Fitted;
 use diagnosis::hypotheses::{Options, fit_all};
-use diagnosis::layout::NUISANCES;
-use diagnosis::least_squares::minimise;
-use models::pass::Pass;
+use diagnosis::regression::evidence::Posterior;
+use diagnosis::regression::layout::NUISANCES;
+use diagnosis::regression::least_squares::minimise;
+use models::Pass;
 use nalgebra::{DMatrix, DVector};
 use serde::{Deserialize, Serialize};
 use std::collections::BTreeMap;

@@ -5,12 +5,10 @@
 //! the truth has a probability of 0.9 or the passes run out. Both sides meet the same stream of noise.
 
 use diagnosis::data::{RigFile, Table};
-use diagnosis::hypotheses::Options;
-use diagnosis::next;
-use diagnosis::verdict::diagnose;
-use models::condition::Condition;
+use diagnosis::report::next;
+use diagnosis::{Options, diagnose};
 use models::covariate;
-use models::pass::Pass;
+use models::{Condition, Pass};
 use rayon::prelude::*;
 use serde::Serialize;
 use sim::noise::Noise;

@@ -3,10 +3,8 @@
 //! The inverse crime on purpose: an interval is one of the library's form, so only data of that form can say
 //! whether it covers. These sets say nothing about naming, and no figure of naming is taken from them.
 
-use diagnosis::Verdict;
 use diagnosis::data::{RigFile, Table};
-use diagnosis::hypotheses::Options;
-use diagnosis::verdict::diagnose;
+use diagnosis::{Options, Verdict, diagnose};
 use effects::{Active, Baseline, Need, Prior, library};
 use rayon::prelude::*;
 use serde::Serialize;

@@ -14,9 +14,8 @@ mod decidable;
 use decidable::{NoiseFree, Oracle, oracle};
 use diagnosis::constants::Constants;
 use diagnosis::data::{RigFile, Table};
-use diagnosis::decision::decide;
-use diagnosis::hypotheses::Options;
-use diagnosis::verdict::{Diagnosis, diagnose};
+use diagnosis::verdict::decide;
+use diagnosis::{Diagnosis, Options, diagnose};
 use models::pass::read_passes;
 use rayon::prelude::*;
 use serde::{Deserialize, Serialize};
@@ -214,7 +213,7 @@ fn score(folder: &Path, options: &Options, changes: &[Constants]) -> Result<Line
         seconds,
         passes: fitted.problem.len(),
         gap_chi2: fitted.problem.misfit(&fitted.none.prediction),
-        shapes: diagnosis::structure::shapes::nats(&fitted.shapes),
+        shapes: diagnosis::hypotheses::structure::shapes::nats(&fitted.shapes),
         fits: fitted
             .candidates
             .iter()

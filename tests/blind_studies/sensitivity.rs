@@ -6,8 +6,8 @@
 use diagnosis::Verdict;
 use diagnosis::constants::{Constants, Stage};
 use diagnosis::data::{RigFile, Table};
-use diagnosis::decision::decide;
 use diagnosis::hypotheses::{Fitted, Options, fit_all};
+use diagnosis::verdict::decide;
 use rayon::prelude::*;
 use sim::sealed::Set;
 use std::sync::Arc;

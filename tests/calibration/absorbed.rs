@@ -78,12 +78,13 @@ fn told(factor: f64) -> Told {
             told.pulls.push(pull);
             assert_eq!(
                 named,
-                pull.abs() >= diagnosis::pulls::REMARKABLE || names(&verdict["certificates_at_fault"])
+                pull.abs() >= diagnosis::report::pulls::REMARKABLE
+                    || names(&verdict["certificates_at_fault"])
             );
             let remarks = verdict["remarks"].to_string();
             assert_eq!(
                 remarks.contains("normal stiffness of"),
-                pull.abs() >= diagnosis::pulls::REMARKABLE,
+                pull.abs() >= diagnosis::report::pulls::REMARKABLE,
                 "{remarks}"
             );
         }

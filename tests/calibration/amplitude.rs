@@ -6,14 +6,14 @@ use crate::force::{at, occasion};
 use calibration::amplitude::AmplitudePoint;
 use calibration::amplitude::apply::{AmplitudeCalibration, AmplitudeFit};
 use calibration::amplitude::droop::{Exponent, droop};
-use calibration::amplitude::gain::{Form, fit};
+use calibration::amplitude::gain::{GainForm, fit};
 use calibration::amplitude::map::mode_shape;
 use calibration::amplitude::resonance::sweep;
 use calibration::amplitude::vibrometer::{Decoder, amplitude};
-use calibration::certificate::{CertificateKind, Outcome};
+use calibration::certificate::{CalibrationResult, CertificateKind};
 use calibration::uncertainty::student::coverage_factor;
-use models::quantity::PeakToPeak;
-use realtime::ports::Nanos;
+use models::PeakToPeak;
+use realtime::Nanos;
 use sim::amplifier::AmplifierInput;
 use sim::defects::{Defects, Surroundings};
 use sim::noise::Noise;
@@ -109,7 +109,7 @@ fn defects(text: &str) -> Defects {
     Defects::parse(text).unwrap()
 }
 
-fn ci(outcome: &Outcome, name: &str) -> [f64; 2] {
+fn ci(outcome: &CalibrationResult, name: &str) -> [f64; 2] {
     outcome.parameters.iter().find(|p| p.name == name).unwrap().ci95
 }
 
@@ -148,7 +148,7 @@ fn gain_resonance_droop_are_covered_as_stated() {
             .map(|n| AmplitudePoint { at: n, amplitude_pp_m: bench.measure(2e-6, tuned, 0.0, n) })
             .collect();
         let (gain_fit, droop_fit) =
-            (fit(&table, Form::Proportional, SCALE_SD), droop(&loads, Exponent::Hertz));
+            (fit(&table, GainForm::Proportional, SCALE_SD), droop(&loads, Exponent::Hertz));
         let (Ok(gain_fit), Ok(droop_fit)) = (gain_fit, droop_fit) else {
             refused += 1;
             continue;

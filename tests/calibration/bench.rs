@@ -5,7 +5,7 @@
 
 use calibration::force::Axis;
 use calibration::force::series::{Branch, LoadReading, Weighing};
-use realtime::ports::Nanos;
+use realtime::Nanos;
 use sim::noise::Noise;
 use sim::sensor::{Sensor, SensorConfig};
 

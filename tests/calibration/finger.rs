@@ -5,7 +5,7 @@ use crate::bench::{Coverage, seed, trials};
 use crate::bound::{independent, jacobian};
 use calibration::finger::friction::{FrictionPoint, friction};
 use calibration::uncertainty::student::coverage_factor;
-use models::quantity::PeakToPeak;
+use models::PeakToPeak;
 use models::ridge::{RidgeCase, RunSettings, run};
 use sim::defects::{Defects, Surroundings};
 use sim::finger::{Finger, FingerConfig};

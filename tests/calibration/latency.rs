@@ -6,7 +6,7 @@ use calibration::force::dynamics::{second_order_step, step_responses};
 use calibration::latency::{channel_delay, clock};
 use calibration::uncertainty::student::coverage_factor;
 use nalgebra::DMatrix;
-use realtime::ports::Nanos;
+use realtime::Nanos;
 use sim::noise::Noise;
 use sim::sensor::{Sensor, SensorConfig};
 

@@ -58,7 +58,7 @@ pub const ROOMS: &[&str] = &[
     "cli/src/verbs/init.rs",
     "cli/src/verbs/show.rs",
     "cli/src/verbs/check.rs",
-    "rig/src/bench/guided.rs",
+    "rig/src/live_calibration/guided.rs",
     "tables/src/calibrate.rs",
 ];
 

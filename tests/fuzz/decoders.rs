@@ -7,7 +7,7 @@ use instruments::codec::can::{CanFrame, SlcanReader, slcan_line};
 use instruments::codec::canopen::{self, DriveState, SdoAnswer};
 use instruments::codec::checksum::Check;
 use instruments::codec::eds;
-use instruments::codec::modbus_rtu::{self as rtu, Heard};
+use instruments::codec::modbus_rtu::{self as rtu, Parsed};
 use instruments::codec::stream::{Cutter, Shape};
 use instruments::codec::{dbc, text};
 
@@ -26,7 +26,7 @@ pub const ALL: &[(&str, fn(&[u8], &mut Chance))] = &[
 /// Whatever is heard or accepted as Modbus RTU lies within the bytes and carries a right check.
 pub fn modbus_rtu(input: &[u8], _: &mut Chance) {
     let question = rtu::read(9, 3, 180, 6);
-    if let Heard::Request(unit, _, length) = rtu::hear(input, &[0x46, 0x6A]) {
+    if let Parsed::Request(unit, _, length) = rtu::hear(input, &[0x46, 0x6A]) {
         assert_eq!(unit, input[0]);
         let (body, check) = input[..length].split_at(length - 2);
         assert!(instruments::codec::checksum::Check::CRC_16_MODBUS.holds(body, check, None));

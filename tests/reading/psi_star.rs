@@ -7,15 +7,12 @@
 //! estimator gives on very many such conditions without noise. Where Eq. 20 itself is the rig's law, the
 //! truth is the law's own number.
 
-use models::condition::Condition;
 use models::psi::{PsiEq17, relative_friction};
-use models::psi_star::{Fit, PSI_EDGE, PSI_RANGE, of_conditions, of_passes};
-use models::quantity::PeakToPeak;
-use models::surrogate::Surrogate;
+use models::psi_star::{PSI_EDGE, PSI_RANGE, PsiStarFit, of_conditions, of_passes};
+use models::{Condition, PeakToPeak, Surrogate};
 use rayon::prelude::*;
 use runs::plan::{Plan, Resolution};
-use runs::sequence::Outcome;
-use runs::setup::Setup;
+use runs::{Outcome, Setup};
 use sim::defects::{Defects, Surroundings};
 use sim::finger::Finger;
 use sim::noise::Noise;
@@ -167,7 +164,7 @@ fn swept(
     shape.references.iter().chain(repeated).map(&mut noisy).collect()
 }
 
-fn fitted(passes: &Passes, setup: &Setup) -> Option<Fit> {
+fn fitted(passes: &Passes, setup: &Setup) -> Option<PsiStarFit> {
     of_passes(passes.iter().copied(), setup.tip.finger.poisson_ratio, setup.file.noise, 0.0)
 }
 
@@ -197,7 +194,7 @@ fn by_hand(passes: &Passes, poisson_ratio: f64) -> [f64; 2] {
 }
 
 /// Psi* lies within the range of its own conditions, and so does its interval where those are ten or more.
-fn within_its_conditions(what: &str, passes: &Passes, fit: &Fit, setup: &Setup) {
+fn within_its_conditions(what: &str, passes: &Passes, fit: &PsiStarFit, setup: &Setup) {
     let [low, high] = by_hand(passes, setup.tip.finger.poisson_ratio);
     // Passes of one setting are one condition here by its first pass, there by its least value.
     let inside = |v: f64| (0.99 * low..=1.01 * high).contains(&v);
@@ -216,8 +213,8 @@ fn held(shape: &Shape, nature: &Nature, truth: f64, each: u64, setup: &Setup) ->
         within_its_conditions(shape.name, &passes, &fit, setup);
         fit
     };
-    let fits: Vec<Fit> = (0..each).into_par_iter().map(one).collect();
-    let mean = |of: &dyn Fn(&Fit) -> f64| 100.0 * fits.iter().map(of).sum::<f64>() / each as f64;
+    let fits: Vec<PsiStarFit> = (0..each).into_par_iter().map(one).collect();
+    let mean = |of: &dyn Fn(&PsiStarFit) -> f64| 100.0 * fits.iter().map(of).sum::<f64>() / each as f64;
     let inside = fits.iter().filter(|f| (f.low..=f.high).contains(&truth)).count() as u64;
     println!(
         "| {} | {} | {truth:.2} | {:+.1} % | {:.1} % | {:.1} % |",

@@ -73,8 +73,8 @@ elsewhere! {
     50 "a crash at every step":
         "tests/peers/crash.rs" a_crash_at_every_step_of_a_sweep_loses_and_doubles_nothing;
     53 "a stall before or during arming":
-        "runs/src/sequence/arming/tests.rs" a_stall_before_arming_is_reported_and_the_second_channel_proved,
-        "runs/src/sequence/arming/tests.rs" a_proof_that_a_stall_broke_off_is_made_again_and_told,
-        "runs/src/sequence/arming/tests.rs" a_stop_that_was_pressed_before_arming_is_not_cleared_by_the_sweep,
-        "runs/src/sequence/arming/tests.rs" a_fault_of_the_amplifiers_own_is_its_own_beside_a_stall_too;
+        "runs/src/sweep/arming/tests.rs" a_stall_before_arming_is_reported_and_the_second_channel_proved,
+        "runs/src/sweep/arming/tests.rs" a_proof_that_a_stall_broke_off_is_made_again_and_told,
+        "runs/src/sweep/arming/tests.rs" a_stop_that_was_pressed_before_arming_is_not_cleared_by_the_sweep,
+        "runs/src/sweep/arming/tests.rs" a_fault_of_the_amplifiers_own_is_its_own_beside_a_stall_too;
 }

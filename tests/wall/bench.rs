@@ -1,9 +1,8 @@
 //! A bench whose quantities a test sets by hand: what goes in must come out of the driver.
 
-use drivers::ended::Ended;
+use drivers::link_error::LinkError;
 use drivers::{InstrumentsSetup, OpenError, Rig};
-use realtime::clock::Clock;
-use realtime::ports::Nanos;
+use realtime::{Clock, Nanos};
 use sim::wire::device::Device;
 use sim::wire::modbus_tcp::ModbusTcpServer;
 use sim::wire::{Command, Plant, Quantity, SharedPlant};
@@ -138,7 +137,7 @@ pub fn eventually<T>(what: &str, mut attempt: impl FnMut() -> Option<T>) -> T {
 pub fn opened(instruments: &InstrumentsSetup, clock: impl Into<Clock> + Clone) -> Rig {
     let open = || drivers::open(instruments, clock.clone());
     let late = |tried: &Result<Rig, OpenError>| {
-        matches!(tried, Err(OpenError::Link { problem: Ended::Timeout(_) | Ended::Cut(_), .. }))
+        matches!(tried, Err(OpenError::Link { problem: LinkError::Timeout(_) | LinkError::Cut(_), .. }))
     };
     let tried = (1..10).map(|_| open()).find(|tried| !late(tried)).unwrap_or_else(open);
     tried.unwrap_or_else(|error| panic!("{error}"))

@@ -6,8 +6,7 @@
 
 use drivers::socketcan::KernelCan;
 use drivers::{AxisSetup, InstrumentSetup, InstrumentsSetup};
-use instruments::bus::{CanEvent, CanPort};
-use instruments::codec::can::CanFrame;
+use instruments::{CanEvent, CanFrame, CanPort};
 use realtime::ports::NoData;
 use sim::wire::can::{CanDevice, CanEmulator};
 use sim::wire::device::Device;

@@ -2,12 +2,12 @@
 //! bundled profile that takes set-points, for each of them: the rig trips within the stated time, or it is
 //! said here, and in docs/devices.md, that nothing shows it.
 
-use models::quantity::PeakToPeak;
+use models::PeakToPeak;
+use realtime::Ports;
 use realtime::cycle::{Command, Marker};
 use realtime::safety::{Cause, Request, Trip};
-use realtime::turn::Ports;
-use rig::wall_loop::WallLoop;
-use rig::wall_loop::{LoopHandle, Parts};
+use rig::wall_clock_loop::WallClockLoop;
+use rig::wall_clock_loop::{LoopHandle, Parts};
 use runs::supervisor::Loop;
 use sim::wire::world::WorldPlant;
 use sim::wire::{Command as Wire, SharedPlant};
@@ -51,7 +51,7 @@ use Fate::{Trips, Unseen};
 const DRIVE: &[Cause] = &[EchoMismatch, AmplitudeRunaway, DriveNoResponse, AmplitudeRate];
 const ANOTHER_LIFE: &str =
     "a second master that keeps feeding it outlives this program's end: the second channel is left";
-/// A chamber is beside the loop: what it measures goes with each pass (`runs/src/sequence/passing.rs`).
+/// A chamber is beside the loop: what it measures goes with each pass (`runs/src/sweep/passing.rs`).
 const AIR: &str = "no run trips; a pass whose level left its tolerance is marked `lost`";
 
 cases! {
@@ -84,7 +84,7 @@ cases! {
 
 /// A rig that is driven, behind its links.
 struct Driven {
-    _rig: WallLoop,
+    _rig: WallClockLoop,
     reins: LoopHandle,
     plant: SharedPlant,
     _emulators: rig::emulators::Emulators,
@@ -102,7 +102,7 @@ impl Driven {
         let mut config = setup.config;
         // The generator has neither watchdog nor relay here: what it shows is looked at, not how it is armed.
         config.limits.amplifier_watchdog = true;
-        let (rig, reins, _) = WallLoop::start(Parts {
+        let (rig, reins, _) = WallClockLoop::start(Parts {
             config,
             model: Arc::new(models::prediction::SpringSlider::new(setup.tip.finger).unwrap()),
             ports: Ports {

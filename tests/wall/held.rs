@@ -1,6 +1,6 @@
 //! The held clock of a virtual rig: a run outlives a computer that pauses, and no instrument can have it.
 
-use realtime::clock::Clock;
+use realtime::Clock;
 use sim::wire::SharedPlant;
 use sim::wire::world::WorldPlant;
 use sim::world::{World, WorldConfig};

@@ -8,15 +8,15 @@
 mod line;
 
 use line::{Fault, Kind, Trouble};
-use models::quantity::PeakToPeak;
+use models::PeakToPeak;
 use rand_chacha::ChaCha8Rng;
 use rand_chacha::rand_core::{Rng, SeedableRng};
 use realtime::cycle::{Command, Marker};
 use realtime::safety::Request;
-use realtime::turn::{Ports, Row};
-use rig::wall_loop::WallLoop;
-use rig::wall_loop::{LoopHandle, Parts};
-use runs::setup::Setup;
+use realtime::{Ports, Row};
+use rig::wall_clock_loop::WallClockLoop;
+use rig::wall_clock_loop::{LoopHandle, Parts};
+use runs::Setup;
 use runs::supervisor::{Loop, OffReport};
 use std::io::{BufRead, BufReader, Write};
 use std::process::{Child, ChildStdout, Stdio};
@@ -128,7 +128,7 @@ impl Drop for Served {
 
 /// A rig behind its links, one of which can be struck.
 struct Bench {
-    rig: Option<WallLoop>,
+    rig: Option<WallClockLoop>,
     reins: LoopHandle,
     served: Arc<Served>,
     trouble: Trouble,
@@ -162,7 +162,7 @@ impl Bench {
         // An amplifier without a watchdog needs a relay to arm. Here none is to help: 'off' must leave by the amplifier's link.
         let mut config = setup.config;
         config.limits.amplifier_watchdog = true;
-        let (rig, reins, _) = WallLoop::start(Parts {
+        let (rig, reins, _) = WallClockLoop::start(Parts {
             config,
             model: Arc::new(models::prediction::SpringSlider::new(setup.tip.finger).unwrap()),
             ports: Ports {

@@ -10,8 +10,7 @@ mod rows;
 
 use realtime::safety::{Cause, Trip};
 use rows::{Fate, ROWS, Row};
-use runs::job::Summary;
-use runs::sequence::Outcome;
+use runs::{Outcome, Summary};
 use std::io::{BufRead, BufReader, Read, Write};
 use std::net::{SocketAddr, TcpStream};
 use std::path::{Path, PathBuf};
@@ -166,7 +165,7 @@ fn thirty_passes(own: &[&'static str]) {
     let found: Vec<(f64, f64)> = passes
         .lines()
         .filter_map(|line| {
-            let pass: runs::sequence::MeasuredPass = serde_json::from_str(line).unwrap();
+            let pass: runs::sweep::MeasuredPass = serde_json::from_str(line).unwrap();
             Some((pass.pass.amplitude.metres(), pass.comparison?.mu_relative?))
         })
         .collect();

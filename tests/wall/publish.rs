@@ -47,17 +47,17 @@ fn mosquitto(folder: &Path) -> (Peer, u16) {
     (broker, port)
 }
 
-type Heard = Arc<Mutex<Vec<(String, Value)>>>;
+type Received = Arc<Mutex<Vec<(String, Value)>>>;
 
 /// mosquitto's own client, which hears everything.
-fn listener(port: u16) -> (Peer, Heard) {
+fn listener(port: u16) -> (Peer, Received) {
     let mut child = Command::new("mosquitto_sub")
         .args(["-h", "127.0.0.1", "-p", &port.to_string(), "-t", "#", "-v", "-q", "1"])
         .stdout(Stdio::piped())
         .spawn()
         .unwrap();
     let lines = BufReader::new(child.stdout.take().unwrap()).lines();
-    let heard = Heard::default();
+    let heard = Received::default();
     let kept = Arc::clone(&heard);
     std::thread::spawn(move || {
         for line in lines.map_while(Result::ok) {

@@ -1,11 +1,9 @@
 //! The loop's own thread, behind real drivers, does not allocate; and how late a thread wakes.
 
-use models::prediction::SpringSlider;
-use realtime::cycle::Command;
-use realtime::ports::Nanos;
-use realtime::turn::Ports;
+use models::SpringSlider;
+use realtime::{Command, Nanos, Ports};
 use ringbuf::traits::Consumer;
-use runs::setup::Setup;
+use runs::Setup;
 use sim::world::WorldConfig;
 use std::alloc::{GlobalAlloc, Layout, System};
 use std::cell::Cell;
@@ -65,7 +63,7 @@ impl realtime::ports::ForceSensor for Counted {
 #[test]
 fn the_loops_thread_allocates_nothing_behind_real_drivers() {
     use realtime::safety::Request;
-    use rig::wall_loop::{Parts, WallLoop};
+    use rig::wall_clock_loop::{Parts, WallClockLoop};
     use runs::supervisor::Loop;
     use std::sync::atomic::{AtomicU64, Ordering};
     let setup = tests::slower(&Setup::load("virtual-ideal").unwrap());
@@ -78,7 +76,7 @@ fn the_loops_thread_allocates_nothing_behind_real_drivers() {
     let counted = Arc::new(AtomicU64::new(u64::MAX));
     let mut ports = setup.certificates.applied(Ports::new(opened.force, opened.amplifier, opened.stage));
     ports.force = Box::new(Counted { inner: ports.force, reads: 0, counted: Arc::clone(&counted) });
-    let (rig, mut reins, mut record) = WallLoop::start(Parts {
+    let (rig, mut reins, mut record) = WallClockLoop::start(Parts {
         config: setup.config,
         model: Arc::new(SpringSlider::new(setup.tip.finger).unwrap()),
         ports,

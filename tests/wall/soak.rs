@@ -2,9 +2,8 @@
 //!
 //! Short by default; `MUPRIME_SOAK_WIRE_S=1800 cargo test --release -p muprime-tests-wall --test soak -- --nocapture`.
 
-use realtime::ports::Nanos;
-use runs::job::Summary;
-use runs::sequence::Outcome;
+use realtime::Nanos;
+use runs::{Outcome, Summary};
 use std::process::Stdio;
 use std::time::{Duration, Instant};
 use tests::muprime;

@@ -347,9 +347,9 @@ fn a_drive_that_is_not_read_back_off_is_said_first_and_every_way() {
                 let mut heard = Vec::new();
                 loop {
                     match watching.hear(Duration::from_millis(100)) {
-                        rig::live::Heard::Message(message) => heard.push(*message),
-                        rig::live::Heard::Nothing => {}
-                        rig::live::Heard::Gone => return heard,
+                        rig::live::Received::Message(message) => heard.push(*message),
+                        rig::live::Received::Nothing => {}
+                        rig::live::Received::Gone => return heard,
                     }
                 }
             });

@@ -284,7 +284,7 @@ fn a_terminal_that_nobody_reads_holds_nothing_up() {
         filler.join().unwrap();
         let summary: runs::job::Summary =
             serde_json::from_str(&std::fs::read_to_string(out.join("summary.json")).unwrap()).unwrap();
-        if matches!(summary.outcome, runs::sequence::Outcome::Tripped(_)) {
+        if matches!(summary.outcome, runs::sweep::Outcome::Tripped(_)) {
             return Some(out);
         }
         assert_eq!((summary.passes, summary.record_lost), (12, 0));

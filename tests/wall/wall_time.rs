@@ -218,10 +218,10 @@ pub fn cut_by_a_stall(out: &Path) -> Option<String> {
     let summary: runs::job::Summary = serde_json::from_str(&said).unwrap();
     let stalls = summary.stalls.expect("a run in wall-clock time has a monitor");
     let trip = match summary.outcome {
-        runs::sequence::Outcome::Tripped(trip) => trip,
+        runs::sweep::Outcome::Tripped(trip) => trip,
         // The proof of the second channel has its own bounds in time, and ten seconds to go through.
         // An amplifier whose supply was cut for a stall has no fault: that cause is never forgiven.
-        runs::sequence::Outcome::WouldNotArm { blocking }
+        runs::sweep::Outcome::WouldNotArm { blocking }
             if stalls.worst.0 >= KEEPS_FROM_ARMING.0
                 && blocking != Some(realtime::safety::Cause::AmplifierFault) =>
         {

@@ -3,10 +3,9 @@
 //! Each trip must match what was injected, or a stall of the machine that the monitor recorded (then the case
 //! is run again, seven times at most); reactions are judged on the virtual amplifier's own clock.
 
-use realtime::ports::Nanos;
+use realtime::Nanos;
 use realtime::safety::{Cause, Trip};
-use runs::job::Summary;
-use runs::sequence::Outcome;
+use runs::{Outcome, Summary};
 use std::io::{BufRead, BufReader};
 use std::path::{Path, PathBuf};
 use std::process::{Child, ChildStdout, Stdio};

@@ -5,9 +5,9 @@ use super::gain::GainFit;
 use super::map::ModeShape;
 use super::resonance::Resonance;
 use crate::certificate::{
-    BudgetLine, CertificateKind, Finding, Outcome, Refusal, Residuals, Verified, parameters,
+    BudgetLine, CalibrationResult, CertificateKind, Finding, Refusal, Residuals, Verified, parameters,
 };
-use models::quantity::PeakToPeak;
+use models::PeakToPeak;
 use std::collections::BTreeMap;
 use std::f64::consts::PI;
 
@@ -32,7 +32,7 @@ pub struct AmplitudeFit {
 
 impl AmplitudeFit {
     /// Everything that the certificate states.
-    pub fn outcome(&self) -> Outcome {
+    pub fn outcome(&self) -> CalibrationResult {
         let gain = &self.gain;
         let covariance = &gain.fit.covariance + &gain.type_b;
         let gained = |(i, (name, unit)): (usize, (String, String))| {
@@ -75,7 +75,7 @@ impl AmplitudeFit {
         }
         let sd = gain.fit.residual_sd();
         let covariance = Finding::covariance(&findings, &blocks);
-        Outcome {
+        CalibrationResult {
             kind: CertificateKind::Amplitude,
             model:
                 "w(s, x, F) = (gain s [+ offset] [+ bend s^2]) shape(x) / shape(x_table) / (1 + droop F^p), \

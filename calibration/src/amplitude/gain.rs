@@ -6,7 +6,7 @@ use nalgebra::{DMatrix, DVector};
 
 /// Form of the curve.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Default)]
-pub enum Form {
+pub enum GainForm {
     /// `w = g s`.
     #[default]
     Proportional,
@@ -16,24 +16,24 @@ pub enum Form {
     Bent,
 }
 
-impl Form {
+impl GainForm {
     /// Names and units of the parameters, for a set-point in this unit.
     pub fn names(self, unit: &str) -> Vec<(String, String)> {
         let per = |power: &str| format!("m/{unit}{power}");
         let mut names = vec![("gain".into(), if unit == "m" { "1".into() } else { per("") })];
         match self {
-            Form::Proportional => {}
-            Form::Affine => names.push(("offset".into(), "m".into())),
-            Form::Bent => names.push(("bend".into(), per("^2"))),
+            GainForm::Proportional => {}
+            GainForm::Affine => names.push(("offset".into(), "m".into())),
+            GainForm::Bent => names.push(("bend".into(), per("^2"))),
         }
         names
     }
 
     fn columns(self, s: f64) -> Vec<f64> {
         match self {
-            Form::Proportional => vec![s],
-            Form::Affine => vec![s, 1.0],
-            Form::Bent => vec![s, s * s],
+            GainForm::Proportional => vec![s],
+            GainForm::Affine => vec![s, 1.0],
+            GainForm::Bent => vec![s, s * s],
         }
     }
 }
@@ -42,7 +42,7 @@ impl Form {
 #[derive(Clone, Debug, PartialEq)]
 pub struct GainFit {
     /// Its form.
-    pub form: Form,
+    pub form: GainForm,
     /// Estimates, covariance by statistics, weighted residuals (relative to the amplitude).
     pub fit: Fit,
     /// Covariance of what all points share: the vibrometer's own calibration.
@@ -60,10 +60,10 @@ pub struct GainFit {
 /// Too few points, a plate that saturates, points that do not follow the form.
 pub fn fit(
     points: &[AmplitudePoint],
-    form: Form,
+    form: GainForm,
     vibrometer_relative_sd: f64,
 ) -> Result<GainFit, AmplitudeError> {
-    check(points, "different set-points", if form == Form::Proportional { 3 } else { 4 })?;
+    check(points, "different set-points", if form == GainForm::Proportional { 3 } else { 4 })?;
     refuse_saturation(points)?;
     let (n, columns) = (points.len(), form.columns(1.0).len());
     let fit = weighted(points, |scatter| {
@@ -73,7 +73,7 @@ pub fn fit(
     let p = lack_of_fit(points, fit.residuals.as_slice(), columns);
     if let Some(p) = p.filter(|p| *p < 1e-3) {
         let remedy = match form {
-            Form::Proportional => "try the affine or the bent form, and look for a loose plate",
+            GainForm::Proportional => "try the affine or the bent form, and look for a loose plate",
             _ => "the plate or the vibrometer changed between readings",
         };
         return Err(AmplitudeError::LackOfFit { p, remedy });
@@ -117,7 +117,7 @@ mod tests {
 
     #[test]
     fn a_gain_comes_back_with_the_vibrometers_share() {
-        let found = fit(&table(|s| 0.93 * s), Form::Proportional, 0.01).unwrap();
+        let found = fit(&table(|s| 0.93 * s), GainForm::Proportional, 0.01).unwrap();
         assert!((found.fit.estimates[0] - 0.93).abs() < 2.0 * found.fit.standard_uncertainty(0));
         assert!((found.type_b[(0, 0)].sqrt() - 0.0093).abs() < 1e-5);
     }
@@ -135,7 +135,7 @@ mod tests {
                         AmplitudePoint { at, amplitude_pp_m: (1.1 * at * (1.0 + 0.25 * scatter)).max(0.0) }
                     })
                     .collect();
-                fit(&points, Form::Proportional, 0.0).ok().map(|found| found.fit.estimates[0])
+                fit(&points, GainForm::Proportional, 0.0).ok().map(|found| found.fit.estimates[0])
             })
             .collect();
         let mean = gains.iter().sum::<f64>() / gains.len() as f64;
@@ -144,10 +144,10 @@ mod tests {
 
     #[test]
     fn saturation_and_a_wrong_form_are_refused() {
-        let error = fit(&table(|s| s.min(3e-6)), Form::Proportional, 0.0).unwrap_err();
+        let error = fit(&table(|s| s.min(3e-6)), GainForm::Proportional, 0.0).unwrap_err();
         assert!(error.to_string().contains("saturates"), "{error}");
-        let error = fit(&table(|s| s * (1.0 - 0.1 * s / 4e-6)), Form::Proportional, 0.0).unwrap_err();
+        let error = fit(&table(|s| s * (1.0 - 0.1 * s / 4e-6)), GainForm::Proportional, 0.0).unwrap_err();
         assert!(matches!(error, AmplitudeError::LackOfFit { .. }), "{error}");
-        assert!(fit(&table(|s| s * (1.0 - 0.1 * s / 4e-6)), Form::Bent, 0.0).is_ok());
+        assert!(fit(&table(|s| s * (1.0 - 0.1 * s / 4e-6)), GainForm::Bent, 0.0).is_ok());
     }
 }

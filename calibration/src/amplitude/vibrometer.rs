@@ -4,7 +4,7 @@
 //! The delay must be subtracted in phase: 8 us are 84 degrees at 29 kHz.
 
 use crate::regression::{FitError, linear};
-use models::quantity::PeakToPeak;
+use models::PeakToPeak;
 use nalgebra::{DMatrix, DVector};
 use std::f64::consts::PI;
 

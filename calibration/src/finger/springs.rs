@@ -6,12 +6,9 @@
 //! value. Where the passes scatter more than stated, the interval is as much wider.
 
 use super::{FingerError, enough};
-use models::condition::Condition;
-use models::finger::Finger;
 use models::pass::{Pass, coulomb_coefficient};
-use models::quantity::PeakToPeak;
-use models::rig_file::PassNoise;
 use models::spring_slider;
+use models::{Condition, Finger, PassNoise, PeakToPeak};
 use nalgebra::{DMatrix, DVector};
 use statrs::distribution::{ChiSquared, ContinuousCDF, FisherSnedecor};
 

@@ -5,9 +5,10 @@ use super::series::Weighing;
 use super::zero::Zero;
 use super::{AXES, Axis};
 use crate::certificate::{
-    BudgetLine, CertificateKind, Finding, Outcome, Parameter, Refusal, Residuals, Verified, parameters,
+    BudgetLine, CalibrationResult, CertificateKind, Finding, Parameter, Refusal, Residuals, Verified,
+    parameters,
 };
-use models::rig_file::Calibration;
+use models::Calibration;
 use nalgebra::{Matrix2, Vector2};
 use std::collections::BTreeMap;
 
@@ -16,7 +17,7 @@ const TEMPERATURE_REACH_K: f64 = 3.0;
 
 impl ForceFit {
     /// Everything that the certificate states.
-    pub fn outcome(&self, weighing: &Weighing) -> Outcome {
+    pub fn outcome(&self, weighing: &Weighing) -> CalibrationResult {
         let covariance = self.covariance();
         let names = AXES.iter().flat_map(|a| self.terms.iter().map(|t| t.name(*a)));
         let numbers = self.estimates.iter().zip(self.effective_degrees_of_freedom());
@@ -59,7 +60,7 @@ impl ForceFit {
             let sd = weighing.alignment_sd_rad[a as usize];
             budget.push(BudgetLine::b(format!("direction of the {a} pull"), sd, "rad"));
         }
-        Outcome {
+        CalibrationResult {
             kind: CertificateKind::Force,
             model: "counts_i = offset_i + sum_j (gain_ij F_j + square_ij F_j^2) + drift_i (t - mean t) \
                     + hysteresis_ij b 4 s (1 - |s|) + temperature"

@@ -7,14 +7,14 @@
 
 use super::{CHI2_95, IdentifyError, Search, apart, check, row_sds};
 use crate::phase::table::PhasePoint;
-use models::quantity::PeakToPeak;
+use models::PeakToPeak;
 use models::ridge::phase_curves::{Skin, SkinGrid, retardation_place};
 use models::root::halved;
 use serde::Serialize;
 
 /// One quantity with the other two free.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize)]
-pub struct Profile {
+pub struct ProfileInterval {
     /// Best value.
     pub best: f64,
     /// 95 % profile interval; it may hold gaps, this is its hull.
@@ -29,11 +29,11 @@ pub struct Profile {
 #[derive(Clone, Debug, PartialEq, Serialize)]
 pub struct IdentifiedSkin {
     /// `E_sc` in Pa.
-    pub young_modulus_pa: Profile,
+    pub young_modulus_pa: ProfileInterval,
     /// `k` over `E_sc`.
-    pub penalty_ratio: Profile,
+    pub penalty_ratio: ProfileInterval,
     /// `tau` in s.
-    pub retardation_time_s: Profile,
+    pub retardation_time_s: ProfileInterval,
     /// Chi-square at the best skin.
     pub chi2: f64,
     /// Least chi-square of elastic skin with the default penalty.
@@ -248,7 +248,7 @@ fn compass(chi2: &impl Fn(Place) -> f64, start: Place, spacing: Place, free: [bo
 }
 
 /// The interval where the profile lies within 95 %, its ends by straight lines between the values scanned.
-fn profile(range: &Range, axis: usize, curve: &[(Place, f64)], best: f64, least: f64) -> Profile {
+fn profile(range: &Range, axis: usize, curve: &[(Place, f64)], best: f64, least: f64) -> ProfileInterval {
     let share = |n: usize| n as f64 / (curve.len() - 1) as f64;
     let limit = least + CHI2_95;
     let (mut low, mut high) = (best, best);
@@ -268,7 +268,7 @@ fn profile(range: &Range, axis: usize, curve: &[(Place, f64)], best: f64, least:
     let spacing = share(1);
     let low_end = if low > 0.0 { crossing(low, (low - spacing).max(0.0)) } else { 0.0 };
     let high_end = if high < 1.0 { crossing(high, (high + spacing).min(1.0)) } else { 1.0 };
-    Profile {
+    ProfileInterval {
         best: range.value(axis, best),
         ci95: [range.value(axis, low_end), range.value(axis, high_end)],
         closed: [low_end > 1e-6, high_end < 1.0 - 1e-6],
@@ -380,7 +380,7 @@ mod tests {
         identify_skin(&data, &grid(), &SEARCH, &elastic, toy).expect("identified")
     }
 
-    fn holds(profile: &Profile, truth: f64) -> bool {
+    fn holds(profile: &ProfileInterval, truth: f64) -> bool {
         profile.ci95[0] <= truth * 1.001 && truth * 0.999 <= profile.ci95[1]
     }
 

@@ -1,9 +1,9 @@
 //! The certificate of a phase calibration.
 
 use super::RepeatedShift;
-use crate::certificate::{BudgetLine, CertificateKind, Finding, Outcome, Residuals, parameters};
+use crate::certificate::{BudgetLine, CalibrationResult, CertificateKind, Finding, Residuals, parameters};
 use crate::regression::ends;
-use models::quantity::PeakToPeak;
+use models::PeakToPeak;
 use nalgebra::DMatrix;
 use std::collections::BTreeMap;
 
@@ -21,7 +21,7 @@ pub struct Acquisition {
 }
 
 /// Everything that a phase certificate states: one parameter an amplitude.
-pub fn outcome(found: &[(PeakToPeak, RepeatedShift)], at: &Acquisition) -> Outcome {
+pub fn outcome(found: &[(PeakToPeak, RepeatedShift)], at: &Acquisition) -> CalibrationResult {
     let finding = |(w, f): &(PeakToPeak, RepeatedShift)| {
         let (phase, name) = (&f.phase_deg, format!("phase_at_{:.3}_um_pp", w.micrometres()));
         Finding::new(name, "deg", [phase.value, phase.standard_uncertainty], phase.degrees_of_freedom)
@@ -42,7 +42,7 @@ pub fn outcome(found: &[(PeakToPeak, RepeatedShift)], at: &Acquisition) -> Outco
     let mut settings = BTreeMap::from([("frequency_hz".to_string(), at.frequency_hz.to_string())]);
     settings.extend(at.condition.iter().map(|c| ("condition".to_string(), c.clone())));
     settings.extend(at.normal_force_n.iter().map(|f| ("normal_force_n".to_string(), f.to_string())));
-    Outcome {
+    CalibrationResult {
         kind: CertificateKind::Phase,
         model: "Phi = 360 |t_pa - t_sa| / T (Eq. 1), mean on the circle over repeats".into(),
         settings,

@@ -1,7 +1,7 @@
 //! The phase table of docs/contract.md (`PHASES.csv`): what `calibrate phase` writes and `calibrate finger` reads.
 
 use crate::rows;
-use models::quantity::PeakToPeak;
+use models::PeakToPeak;
 use serde::{Deserialize, Serialize};
 use std::io::{Read, Write};
 

@@ -2,8 +2,8 @@
 
 use super::prelude::*;
 use calibration::certificate::{Certificate, ReadError};
-use rig::bench::AtTheBench;
-use runs::human::{number, with_uncertainty};
+use rig::live_calibration::AtTheBench;
+use runs::format::{number, with_uncertainty};
 use tables::calibrate::{Issued, What, certified, verify};
 
 #[derive(Debug, clap::Args)]

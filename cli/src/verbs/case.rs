@@ -2,8 +2,8 @@
 
 use super::prelude::*;
 use std::ops::Range;
-use studies::cases::share::Share;
 use studies::cases::study::Study;
+use studies::cases::task_range::Share;
 use studies::cases::worker::{Done, work};
 
 #[derive(Debug, clap::Args)]

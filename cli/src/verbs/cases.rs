@@ -192,11 +192,11 @@ fn named_values<T>(
 }
 
 /// The spans of `--span`.
-pub(crate) fn spans(list: &[String]) -> miette::Result<BTreeMap<String, ridge::Span>> {
+pub(crate) fn spans(list: &[String]) -> miette::Result<BTreeMap<String, ridge::ValueRange>> {
     named_values("--span", "NAME=LOW..HIGH or NAME=LOW..HIGH:log", list, |text| {
         let (ends, log) = text.strip_suffix(":log").map_or((text, false), |ends| (ends, true));
         let (low, high) = ends.split_once("..")?;
-        Some(ridge::Span { low: low.trim().parse().ok()?, high: high.trim().parse().ok()?, log })
+        Some(ridge::ValueRange { low: low.trim().parse().ok()?, high: high.trim().parse().ok()?, log })
     })
 }
 

@@ -1,8 +1,8 @@
 //! `muprime check FILE...`: says what is wrong with files of any kind, and whether a plan can run on a setup.
 
 use super::prelude::*;
+use runs::Setup;
 use runs::print::folded;
-use runs::setup::Setup;
 use tables::check::{Good, On, kind_of, problems_of};
 
 #[derive(Debug, clap::Args)]

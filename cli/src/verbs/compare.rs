@@ -4,8 +4,8 @@ use super::prelude::*;
 use runs::ambient::air_words;
 use runs::compare::differences::Difference;
 use runs::compare::groups::{GroupBy, Grouped, MOST_COMPARED};
-use runs::compare::{Answer, Compared};
-use runs::human;
+use runs::compare::{Compared, ComparisonAnswer};
+use runs::format;
 use runs::print::folded;
 use std::fmt::Write;
 
@@ -48,7 +48,7 @@ pub fn run(args: &Args, json: bool) -> miette::Result<ExitCode> {
         say!("report: {} (the dashboard compares two runs by itself)", page.display());
     }
     answered(json, &json!(compared), folded(&terminal(&compared), 2))?;
-    let differ = compared.comparison.answer() == Answer::Differ;
+    let differ = compared.comparison.answer() == ComparisonAnswer::Differ;
     exit(if args.fail_on_difference && differ { FAILED } else { DONE })
 }
 
@@ -108,7 +108,7 @@ fn terminal(Compared { comparison: result, warnings: warned, differences: differ
     let _ = writeln!(w, "settings that differ: {none}");
     let shown = |value: &Option<String>| match value.as_ref().map(|v| (v, v.parse::<f64>())) {
         None => "none".to_string(),
-        Some((_, Ok(value))) if value.fract() != 0.0 => human::number(value),
+        Some((_, Ok(value))) if value.fract() != 0.0 => format::number(value),
         Some((text, _)) if text.chars().count() <= SHOWN => text.clone(),
         Some((text, _)) => text.chars().take(SHOWN).collect::<String>() + "...",
     };

@@ -11,12 +11,12 @@ pub struct Args {
     #[arg(long)]
     folder: Option<PathBuf>,
     #[command(flatten)]
-    place: Place,
+    place: ListenOptions,
 }
 
 /// Where and for whom to serve.
 #[derive(Clone, Debug, clap::Args)]
-pub struct Place {
+pub struct ListenOptions {
     /// Address to listen on; port 0 takes a free one
     #[arg(long, default_value = LISTEN, value_name = "ADDRESS")]
     pub listen: SocketAddr,
@@ -35,10 +35,10 @@ pub struct Place {
     pub allow_control: bool,
 }
 
-impl Place {
+impl ListenOptions {
     /// A dashboard of a folder of runs there; refused where the address cannot be had.
     pub fn serve(self, runs: PathBuf) -> miette::Result<Dashboard> {
-        let Place { listen, hosts, origins, token_file, allow_control } = self;
+        let ListenOptions { listen, hosts, origins, token_file, allow_control } = self;
         Dashboard::start(Options { runs, listen, hosts, origins, token_file, control: allow_control })
     }
 }

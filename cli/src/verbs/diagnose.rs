@@ -1,11 +1,9 @@
 //! `muprime diagnose`: where the gap lies, which effect causes it, how far it shrinks.
 
 use super::prelude::*;
-use diagnosis::data::Table;
-use diagnosis::document::{document, outside, predictions};
-use diagnosis::hypotheses::Options;
 use diagnosis::progress::{Progress, Stage};
-use diagnosis::verdict::Diagnosis;
+use diagnosis::report::document::{document, outside, predictions};
+use diagnosis::{Diagnosis, Options, Table};
 use indicatif::ProgressBar;
 use runs::files::{MODEL, NEXT_PLAN, PAGE, PREDICTIONS, replaceable, write_output};
 use runs::input::{MAX_TABLE_BYTES, bytes_of};
@@ -14,7 +12,7 @@ use runs::verdict_text::files;
 use std::sync::{Arc, Mutex, PoisonError};
 use tables::check::refusal;
 use tables::diagnose::{Subject, inputs, unfit};
-use tables::joined::{Part, joined, start_of};
+use tables::joined::{JoinedTable, joined, start_of};
 use tables::passes::parse_passes;
 
 /// Parts of the operating space that are printed, the largest first.
@@ -169,7 +167,7 @@ fn read(inputs: &Inputs<'_>, args: &Args) -> miette::Result<(Subject, Vec<String
             damage.extend(runs::run_dir::damage_in(data)?);
             rendered |= data.join(runs::fidelity::FILE).is_file();
         }
-        parts.push(Part { name, passes, start_unix_s: start_of(data) });
+        parts.push(JoinedTable { name, passes, start_unix_s: start_of(data) });
         all.extend(bytes);
     }
     let whole = Subject::of(joined(parts)?, &all, rig).map_err(|why| {

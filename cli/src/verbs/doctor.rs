@@ -3,11 +3,10 @@
 mod peek;
 
 use super::prelude::*;
-use rig::doctor::{Finding, Target, machine};
+use rig::doctor::{Finding, InspectionScope, machine};
 use rig::emulators::Emulators;
-use runs::plan::Plan;
 use runs::print::folded;
-use runs::setup::Setup;
+use runs::{Plan, Setup};
 use sim::wire::SharedPlant;
 use sim::wire::world::WorldPlant;
 use sim::world::World;
@@ -93,7 +92,7 @@ fn talk(setup: &Setup, plan: Option<&Plan>) -> miette::Result<Vec<Finding>> {
         };
     }
     let inspected = rig::doctor::inspect(setup, &instruments);
-    let mut findings = rig::doctor::judge(&inspected, &Target { setup, plan });
+    let mut findings = rig::doctor::judge(&inspected, &InspectionScope { setup, plan });
     if let Some(v) = &setup.file.vibrometer {
         let settings = drivers::vibrometer::settings(v);
         findings.push(Finding::new(

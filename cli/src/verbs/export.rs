@@ -1,7 +1,7 @@
 //! `muprime export RUN --to csv|parquet|arrow|hdf5|mcap|ro-crate`.
 
 use super::prelude::*;
-use tables::export::facts::Stated;
+use tables::export::facts::ExportFacts;
 use tables::export::{Format, export};
 
 #[derive(Debug, clap::Args)]
@@ -15,7 +15,7 @@ pub struct Args {
     #[arg(long)]
     out: Option<PathBuf>,
     #[command(flatten)]
-    stated: Stated,
+    stated: ExportFacts,
 }
 
 /// Converts; refused: a folder that holds no run, or a place that cannot be written.

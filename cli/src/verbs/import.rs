@@ -4,7 +4,7 @@ use super::prelude::*;
 use models::covariate;
 use runs::ask;
 use runs::files::{make_folder, write_whole};
-use runs::human::number;
+use runs::format::number;
 use runs::input::{MAX_TABLE_BYTES, bytes_of};
 use std::io::IsTerminal;
 use tables::import::guess::guess;

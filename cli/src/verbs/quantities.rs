@@ -28,7 +28,7 @@ pub fn with_units(command: clap::Command) -> clap::Command {
         let unit = unit(arg.get_id().as_str()).filter(|_| kind == 0);
         let arg = arg.allow_hyphen_values(one);
         match unit {
-            Some(unit) => arg.value_parser(move |text: &str| runs::quantity::parse(text, unit)),
+            Some(unit) => arg.value_parser(move |text: &str| runs::parse_quantity::parse(text, unit)),
             None => arg,
         }
     });

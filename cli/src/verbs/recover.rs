@@ -2,7 +2,7 @@
 
 use super::prelude::*;
 use realtime::recorder::{self, Integrity, Recovery};
-use runs::files::{self, Placed};
+use runs::files::{self, GuardedFile};
 use std::fs::{self, File};
 use std::io::BufReader;
 
@@ -35,7 +35,7 @@ pub fn run(args: Args, json: bool) -> miette::Result<ExitCode> {
     let _held =
         held.wrap_err_with(|| format!("{}: its run is live, or its folder cannot be written", shown()))?;
     let part = files::beside(file);
-    let mended = Placed::fresh(&part)?;
+    let mended = GuardedFile::fresh(&part)?;
     let disk = mended.handle()?;
     let found = recorder::recover(record()?, mended);
     let found = found.into_diagnostic().and_then(|found| disk.sync().map(|()| found));

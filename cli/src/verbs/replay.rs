@@ -1,9 +1,8 @@
 //! `muprime replay`: a recorded run through the same cycle again.
 
 use super::prelude::*;
-use models::law::BuiltIn;
 use models::law::Rendering;
-use models::prediction::FrictionModel;
+use models::{BuiltIn, FrictionModel};
 use realtime::recorder::{CYCLES, Entry, Integrity, Reader, inspect};
 use realtime::replay::{Replay, replay};
 use runs::job::{REPLAYABLE, Replayable, TARGET};

@@ -2,12 +2,11 @@
 
 pub mod campaign;
 
-use super::dashboard::Place;
+use super::dashboard::ListenOptions;
 use super::prelude::*;
 use indicatif::{ProgressBar, ProgressDrawTarget, ProgressStyle};
-use models::condition::Condition;
-use models::law::BuiltIn;
-use realtime::ports::Nanos;
+use models::{BuiltIn, Condition};
+use realtime::Nanos;
 use rig::dashboard::LISTEN;
 use rig::live::{self, Feed};
 use rig::publish::{Broker, Publisher};
@@ -15,11 +14,9 @@ use rig::watch::Watch;
 use runs::catalogue::runs_folder;
 use runs::files::{Made, make_folder};
 use runs::job::{Job, Notes, Signals, Summary, Update, unix_ns};
-use runs::plan::Plan;
 use runs::print::{self, clean, folded};
-use runs::sequence::{Event, Outcome};
-use runs::setup::Setup;
 use runs::supervisor::MAY_BE_ON;
+use runs::{Event, Outcome, Plan, Setup};
 use serde_json::Value;
 use std::io::IsTerminal;
 use std::net::SocketAddr;
@@ -132,7 +129,7 @@ pub fn run(mut args: Args, json: bool) -> miette::Result<ExitCode> {
 /// A dashboard, where the arguments want one, is served from here on, over a folder of runs.
 fn serve(args: &mut Args, runs: &Path) -> miette::Result<()> {
     if let Some(listen) = args.dashboard.take() {
-        let place = Place {
+        let place = ListenOptions {
             listen,
             hosts: Vec::new(),
             origins: std::mem::take(&mut args.origins),
@@ -160,7 +157,7 @@ fn measure(job: Job, planned: usize, args: &Args, signals: &Signals, json: bool)
     let before = runs::run_dir::passes_in(&job.out).unwrap_or_default();
     let mut feed = Feed::new(live::Run::of(&job, planned, before.len()), before, signals);
     let continued = job.plan.file.continues.clone();
-    let summary = rig::wall_run::run(job, signals, &mut |update| {
+    let summary = rig::wall_clock_run::run(job, signals, &mut |update| {
         feed.update(&update);
         followers.update(&update);
     });
@@ -361,7 +358,7 @@ fn watched() -> miette::Result<Signals> {
         std::thread::spawn(|| say!("leaving at once: {MAY_BE_ON}"));
         // The first one has sent the stop; nobody can wait here for what was read back.
         std::thread::sleep(std::time::Duration::from_millis(1500));
-        runs::leave::leave_now(FAILED);
+        runs::exit::exit_now(FAILED);
     })?;
     Ok(signals)
 }

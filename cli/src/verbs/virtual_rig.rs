@@ -2,7 +2,7 @@
 
 use super::prelude::*;
 use drivers::InstrumentsSetup;
-use instruments::schema::LinkKind;
+use instruments::LinkKind;
 use sim::wire::serial::SerialEmulator;
 use sim::wire::world::{Hands, WorldPlant};
 use sim::wire::{Quantity, SharedPlant};

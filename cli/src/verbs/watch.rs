@@ -2,8 +2,8 @@
 
 use super::prelude::*;
 use rig::watch::Watch;
+use runs::MeasuredPass;
 use runs::catalogue::{existing, runs_folder};
-use runs::sequence::MeasuredPass;
 use std::io::{BufRead, BufReader, IsTerminal};
 use std::time::Duration;
 
@@ -24,7 +24,7 @@ pub fn run(args: Args, json: bool) -> miette::Result<ExitCode> {
         .wrap_err_with(|| format!("{} holds no run", run.display()))?;
     if !json && std::io::stdout().is_terminal() && rig::terminal::has_keys().is_ok() {
         // A signal takes the view down, and nothing else: the run is another process's.
-        studies::progress::on_signals(&rig::terminal::STOPS, || runs::leave::leave_now(DONE))?;
+        studies::progress::on_signals(&rig::terminal::STOPS, || runs::exit::exit_now(DONE))?;
         Watch::begin(&run, None, false)?.wait();
         return exit(DONE);
     }

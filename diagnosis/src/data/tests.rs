@@ -1,9 +1,8 @@
 //! Tables that are refused, and what a table can show.
 
 use super::*;
-use crate::hypotheses::Options;
 use crate::tests::{Deviates, rig, table};
-use crate::verdict::diagnose;
+use crate::{Options, diagnose};
 use models::pass::read_passes;
 
 /// A table of passes of a plate that stands still: friction of 0.5 N/N, forces by a rule.

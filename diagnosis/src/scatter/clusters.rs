@@ -6,10 +6,10 @@
 //! either way, so the level is that of the whole family.
 
 use crate::data::range;
-use crate::draws::split_mix;
-use crate::fit::Problem;
-use crate::kernel;
-use models::covariate::{COVARIATES, Role};
+use crate::random::split_mix;
+use crate::regression::Problem;
+use crate::regression::kernel;
+use models::covariate::{COVARIATES, CovariateRole};
 
 /// Shuffles against which a table is held; fewer for long ones.
 const SHUFFLES: usize = 400;
@@ -75,7 +75,7 @@ impl Space {
             let Some(values) = kernel::scaled(c, &problem.passes, largest) else { continue };
             let Some(cells) = levels(&values, c.least_spread) else { continue };
             single.push(Cells::new(c.words.to_string(), cells));
-            if matches!(c.role, Role::Time | Role::Place) && values.len() >= FINE * FEWEST {
+            if matches!(c.role, CovariateRole::Time | CovariateRole::Place) && values.len() >= FINE * FEWEST {
                 fine.push(Cells::new(c.words.to_string(), quantiles(&values, FINE)));
             }
         }

@@ -6,7 +6,7 @@
 
 use crate::constants::Constants;
 use crate::data::Table;
-use crate::fit::Problem;
+use crate::regression::Problem;
 use crate::scatter::lasting;
 use nalgebra::DMatrix;
 use std::f64::consts::PI;

@@ -2,11 +2,7 @@
 
 use crate::constants::Constants;
 use crate::data::Table;
-use crate::discrepancy::Linear;
-use crate::fit::Problem;
-use crate::gaussian::{Scaled, rows_times};
-use crate::kernel::Lengths;
-use crate::layout::NUISANCES;
+use crate::regression::{Lengths, Linear, NUISANCES, Problem, Scaled, rows_times};
 use crate::scatter::lasting;
 use nalgebra::{DMatrix, DVector};
 use std::sync::Arc;

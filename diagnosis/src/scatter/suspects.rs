@@ -1,8 +1,8 @@
 //! Passes that do not belong: how probable that is for each, and when many together are a departure instead.
 
 use crate::constants::Constants;
-use crate::fit::Problem;
-use crate::scatter::clusters::Space;
+use crate::regression::Problem;
+use crate::scatter::Space;
 
 /// Degrees of freedom of the Student weights of the first rounds.
 const STUDENT: f64 = 3.0;

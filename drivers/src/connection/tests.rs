@@ -27,7 +27,7 @@ fn what_is_periodic_is_due_from_its_time_on() {
     assert_eq!([499, 500, 501].map(|now| periodic.is_due(Nanos(now))), [false, true, true]);
 }
 
-fn alone() -> (Connection, Receiver<Result<(), Ended>>) {
+fn alone() -> (Connection, Receiver<Result<(), LinkError>>) {
     let (ready, opened) = sync_channel(4);
     (Connection::new(amplifier().0, Instant::now() - Duration::from_secs(3), Arc::default(), ready), opened)
 }
@@ -36,7 +36,7 @@ fn alone() -> (Connection, Receiver<Result<(), Ended>>) {
 fn the_first_outcome_is_told_once() {
     let (mut connection, opened) = alone();
     assert!(connection.is_first() && connection.tell(Ok(())));
-    assert!(!connection.is_first() && !connection.tell(Err(Ended::Stopped)));
+    assert!(!connection.is_first() && !connection.tell(Err(LinkError::Stopped)));
     assert_eq!((opened.try_recv(), opened.try_recv().is_err()), (Ok(Ok(())), true));
 }
 

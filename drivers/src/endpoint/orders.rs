@@ -5,12 +5,12 @@
 //! again wherever it was refused, or a state that came after it still says 'on'.
 
 use super::{ALARM_HOLDS, Endpoint, Part};
-use crate::Role;
+use crate::PortRole;
 use crate::mailbox::Mailbox;
 use crate::off::PendingOff;
 use crate::ports::SetPoint;
 use instruments::{Profile, SetId};
-use realtime::clock::Clock;
+use realtime::Clock;
 use realtime::ports::{Nanos, NoData};
 use ringbuf::traits::Producer;
 use std::sync::Arc;
@@ -211,13 +211,13 @@ impl Endpoint {
     }
 
     /// What the instrument is to the rig.
-    pub fn role(&self) -> Role {
+    pub fn role(&self) -> PortRole {
         match self.part {
-            Part::Force { .. } => Role::Force,
-            Part::Amplifier { .. } => Role::Amplifier,
-            Part::Stage { .. } => Role::Stage,
-            Part::Supply { .. } => Role::Supply,
-            Part::Contacts(_) => Role::Contacts,
+            Part::Force { .. } => PortRole::Force,
+            Part::Amplifier { .. } => PortRole::Amplifier,
+            Part::Stage { .. } => PortRole::Stage,
+            Part::Supply { .. } => PortRole::Supply,
+            Part::Contacts(_) => PortRole::Contacts,
         }
     }
 

@@ -1,9 +1,9 @@
 //! 'Off' over TCP on this machine: an instrument that refuses a part of it, and one whose connection is lost.
 
 use super::*;
-use crate::ended::Closed;
 use crate::endpoint::Endpoint;
 use crate::endpoint::tests::{DriveSetPoint, on, state};
+use crate::link_error::Closed;
 use crate::ports::AmplifierPort;
 use std::io::{Read, Write};
 use std::net::{TcpListener, TcpStream};

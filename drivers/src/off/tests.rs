@@ -35,10 +35,10 @@ impl Instrument {
 }
 
 impl OffWay for Instrument {
-    fn send_off(&mut self, connection: &mut Connection) -> Result<(), Ended> {
+    fn send_off(&mut self, connection: &mut Connection) -> Result<(), LinkError> {
         self.did.push(Did::Off);
         if self.offs() >= self.breaks_at {
-            return Err(Ended::Io("the wire broke".into()));
+            return Err(LinkError::Io("the wire broke".into()));
         }
         let safe = connection.endpoint.hand_out_off(connection.now());
         assert!(!safe.is_empty());
@@ -49,7 +49,7 @@ impl OffWay for Instrument {
         self.did.push(Did::Patient);
     }
 
-    fn read_state(&mut self, connection: &mut Connection) -> Result<(), Ended> {
+    fn read_state(&mut self, connection: &mut Connection) -> Result<(), LinkError> {
         self.did.push(Did::Read);
         self.states += 1;
         let on = self.offs() < self.off_from;
@@ -89,7 +89,7 @@ fn an_instrument_that_shows_on_for_good_is_said_to_be_on() {
     let (mut connection, mut instrument) = (driven(), Instrument::new(usize::MAX));
     let began = Instant::now();
     let ended = at_the_end(&mut connection, &mut instrument);
-    assert!(matches!(ended, Ended::StillOn), "{ended}");
+    assert!(matches!(ended, LinkError::StillOn), "{ended}");
     assert!(
         began.elapsed() >= OFF_WITHIN && instrument.offs() >= 3,
         "{} in {:?}",
@@ -103,14 +103,14 @@ fn a_wire_that_breaks_ends_it_and_off_stays_owed() {
     let (mut connection, mut instrument) = (driven(), Instrument::new(usize::MAX));
     instrument.breaks_at = 2;
     let ended = at_the_end(&mut connection, &mut instrument);
-    assert!(matches!(ended, Ended::Io(_)), "{ended}");
+    assert!(matches!(ended, LinkError::Io(_)), "{ended}");
     assert!(instrument.offs() == 2 && connection.endpoint.owes_off());
 }
 
 #[test]
 fn an_orderly_end_is_off_read_back() {
     let (mut connection, mut instrument) = (driven(), Instrument::new(1));
-    assert!(matches!(at_the_end(&mut connection, &mut instrument), Ended::Stopped));
+    assert!(matches!(at_the_end(&mut connection, &mut instrument), LinkError::Stopped));
     assert!(connection.endpoint.reads_off());
 }
 
@@ -119,7 +119,7 @@ fn a_sensor_is_not_switched() {
     let setup = InstrumentSetup::new("muprime-force2", "");
     let (endpoint, _port) = Endpoint::force(profile("muprime-force2").unwrap(), &setup).unwrap();
     let (mut connection, mut instrument) = (connection_of(endpoint), Instrument::new(1));
-    assert!(matches!(at_the_end(&mut connection, &mut instrument), Ended::Stopped));
+    assert!(matches!(at_the_end(&mut connection, &mut instrument), LinkError::Stopped));
     assert_eq!(instrument.did, []);
 }
 

@@ -180,7 +180,7 @@ pub enum Operation {
 
 /// What the bytes that came so far are.
 #[derive(Debug, Clone, PartialEq, Eq)]
-pub enum Heard {
+pub enum Parsed {
     /// The start of something.
     Incomplete,
     /// No request begins here: drop a byte and look again.
@@ -191,21 +191,21 @@ pub enum Heard {
 
 /// Looks for a request at the start of `bytes`; `own` are the functions of the maker's own, whose
 /// requests have one byte of data.
-pub fn hear(bytes: &[u8], own: &[u8]) -> Heard {
-    let Some(&function) = bytes.get(1) else { return Heard::Incomplete };
+pub fn hear(bytes: &[u8], own: &[u8]) -> Parsed {
+    let Some(&function) = bytes.get(1) else { return Parsed::Incomplete };
     let length = match function {
         1..=4 | 6 => 8,
         15 | 16 => match bytes.get(6) {
-            None => return Heard::Incomplete,
+            None => return Parsed::Incomplete,
             Some(&count) => 9 + usize::from(count),
         },
         _ if own.contains(&function) => 5,
-        _ => return Heard::Noise,
+        _ => return Parsed::Noise,
     };
-    let Some(frame) = bytes.get(..length) else { return Heard::Incomplete };
+    let Some(frame) = bytes.get(..length) else { return Parsed::Incomplete };
     let (body, crc) = frame.split_at(length - 2);
     if !Check::CRC_16_MODBUS.holds(body, crc, None) {
-        return Heard::Noise;
+        return Parsed::Noise;
     }
     let word = |at: usize| u16::from_be_bytes([body[at], body[at + 1]]);
     let operation = match function {
@@ -216,13 +216,13 @@ pub fn hear(bytes: &[u8], own: &[u8]) -> Heard {
             let registers = match function {
                 15 if data.len() == count.div_ceil(8) => from_bits(data, count),
                 16 if data.len() == 2 * count => (0..count).map(|i| word(7 + 2 * i)).collect(),
-                _ => return Heard::Noise,
+                _ => return Parsed::Noise,
             };
             Operation::Write { function, address: word(2), registers }
         }
         _ => Operation::Custom { function, data: body[2] },
     };
-    Heard::Request(body[0], operation, length)
+    Parsed::Request(body[0], operation, length)
 }
 
 /// The answer that gives registers, as bits where the function is one of bits.
@@ -271,7 +271,7 @@ mod tests {
         assert_eq!(&write.bytes[..9], &[1, 15, 0, 19, 0, 10, 2, 0xCD, 0x01]);
         let heard = hear(&write.bytes, &[]);
         let operation = Operation::Write { function: 15, address: 19, registers: coils.clone() };
-        assert_eq!(heard, Heard::Request(1, operation, write.bytes.len()));
+        assert_eq!(heard, Parsed::Request(1, operation, write.bytes.len()));
         assert!(written(&write, &confirm(1, 15, 19, 10)).is_ok());
         assert_eq!(give(1, 1, &coils)[2..5], [2, 0xCD, 0x01]);
     }
@@ -286,12 +286,12 @@ mod tests {
     #[test]
     fn both_sides_agree() {
         let request = read(9, 3, 180, 2);
-        let heard = Heard::Request(9, Operation::Read { function: 3, address: 180, count: 2 }, 8);
+        let heard = Parsed::Request(9, Operation::Read { function: 3, address: 180, count: 2 }, 8);
         assert_eq!(hear(&request.bytes, &[]), heard);
         assert_eq!(registers(&request, &give(9, 3, &[1, 0xFFFE])).unwrap(), [0, 1, 0xFF, 0xFE]);
         let request = write(9, 410, &[0x0200, 7]);
         let operation = Operation::Write { function: 16, address: 410, registers: vec![0x0200, 7] };
-        assert_eq!(hear(&request.bytes, &[]), Heard::Request(9, operation, 13));
+        assert_eq!(hear(&request.bytes, &[]), Parsed::Request(9, operation, 13));
         assert_eq!(written(&request, &confirm(9, 16, 410, 2)), Ok(()));
         assert_eq!(written(&request, &confirm(9, 16, 411, 2)), Err(RtuError::Mismatch));
     }
@@ -320,7 +320,7 @@ mod tests {
     fn every_cut_of_a_request_is_incomplete() {
         for request in [read(9, 3, 0, 6), write(9, 0, &[1, 2, 3]), custom(9, 0x46, &[0x55], 5)] {
             for cut in 0..request.bytes.len() {
-                assert_eq!(hear(&request.bytes[..cut], &[0x46]), Heard::Incomplete, "{cut}");
+                assert_eq!(hear(&request.bytes[..cut], &[0x46]), Parsed::Incomplete, "{cut}");
             }
         }
     }

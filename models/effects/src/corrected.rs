@@ -7,9 +7,8 @@
 use crate::effect::Effect;
 use crate::operating::{Baseline, Design};
 use crate::predict::{Active, lateral_force};
-use models::condition::{Ambient, Condition, OutOfDomain};
-use models::covariate::Covariate;
 use models::prediction::{FrictionModel, Prediction, Regime, Validity};
+use models::{Ambient, Condition, Covariate, OutOfDomain};
 use serde::{Deserialize, Serialize};
 use std::sync::Arc;
 

@@ -3,7 +3,7 @@
 use crate::contact::Contact;
 use crate::operating::{Design, SensorError};
 use crate::own::OwnTable;
-use models::condition::Condition;
+use models::Condition;
 use models::covariate::{self, Covariate};
 use models::rig_file::CertifiedKey;
 use serde::Serialize;

@@ -1,7 +1,7 @@
 //! The baseline's parameters, what the whole design says about scales, and what a reading is.
 
 use crate::contact::{Contact, Held};
-use models::condition::Condition;
+use models::Condition;
 
 /// Reference scales of a whole table: effects that need a zero of time, load or temperature take it from here.
 #[derive(Debug, Clone, Copy, PartialEq, serde::Serialize, serde::Deserialize, schemars::JsonSchema)]

@@ -18,12 +18,12 @@ mod header;
 
 use crate::effect::{Effect, Law, Location, Parameter};
 use crate::library::{KNOWN, library};
-use models::condition::{Condition, OutOfDomain};
-use models::law_table::{Answers, LawTable};
+use models::law_table::{LawTable, TabulatedQuantity};
+use models::{Condition, OutOfDomain};
 use std::sync::{PoisonError, RwLock};
 
 /// What such a table answers.
-const CHANGE: Answers = Answers {
+const CHANGE: TabulatedQuantity = TabulatedQuantity {
     what: "an effect table",
     variables: models::law_table::VARIABLES.len(),
     columns: &[(COLUMN, [-1.0, 10.0])],

@@ -3,7 +3,7 @@
 use crate::contact::{Contact, mean_friction};
 use crate::effect::{Effect, Input};
 use crate::operating::{Baseline, Design, LEAST_SHARE, SensorError};
-use models::condition::Condition;
+use models::Condition;
 
 /// An effect with the law and parameters at which it acts.
 #[derive(Clone, Copy)]
@@ -66,7 +66,7 @@ pub fn read(
 #[cfg(test)]
 mod tests {
     use super::*;
-    use models::quantity::PeakToPeak;
+    use models::PeakToPeak;
 
     /// With the plate still, Coulomb's law says what each input does: L = mu F, read with offset and
     /// cross-talk.

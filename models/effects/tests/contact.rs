@@ -1,6 +1,5 @@
 //! The contact solver against figures that an independent time-domain simulation printed.
-use models::condition::Condition;
-use models::quantity::PeakToPeak;
+use models::{Condition, PeakToPeak};
 use muprime_effects::contact::asperities::Heights;
 use muprime_effects::contact::impact::{Bouncing, LANDINGS, STATED_ERROR};
 use muprime_effects::contact::{Attraction, Bonds, Contact, Held, half_contact_angle, mean_friction};

@@ -1,7 +1,7 @@
 //! A compiled model makes nothing in the loop: its first prediction already allocates nothing. Alone in its
 //! process, for tables are made once in each.
 
-use models::condition::Condition;
+use models::Condition;
 use muprime_effects::corrected::{Corrected, SavedModel};
 use muprime_effects::operating::{Baseline, Design};
 use std::alloc::{GlobalAlloc, Layout, System};

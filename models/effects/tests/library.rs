@@ -1,7 +1,6 @@
 //! What the library says of its causes is true: names exist, exact aliases are exact, checks and certificates fit.
-use models::condition::Condition;
-use models::quantity::{Direction, PeakToPeak};
 use models::rig_file::CertifiedKey;
+use models::{Condition, Direction, PeakToPeak};
 use muprime_effects::corrected::{Corrected, SavedEffect, SavedModel, SavedParameter};
 use muprime_effects::{Active, Baseline, Design, Effect, Prior, by_name, known, lateral_force, library};
 use std::collections::BTreeSet;

@@ -1,6 +1,5 @@
 //! Every effect nests the baseline: at the zero of its size the prediction is the baseline's, bit for bit.
-use models::condition::Condition;
-use models::quantity::{Direction, PeakToPeak};
+use models::{Condition, Direction, PeakToPeak};
 use muprime_effects::{Active, Baseline, Design, Parameter, known, library};
 
 fn passes() -> Vec<Condition> {

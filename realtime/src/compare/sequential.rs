@@ -6,7 +6,7 @@
 //! the chance that it ever reaches 1/alpha is at most alpha. Residuals beyond four standard deviations count
 //! as four: a single accident must not end the agreement, and capping a bet only lowers it.
 
-use models::condition::Condition;
+use models::Condition;
 
 /// Chance of a false alarm in a whole run, whatever its length.
 pub const ALARM_LEVEL: f64 = 0.005;

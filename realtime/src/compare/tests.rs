@@ -2,9 +2,7 @@
 #![allow(clippy::disallowed_types)]
 
 use super::*;
-use models::finger::Finger;
-use models::prediction::SpringSlider;
-use models::quantity::{Direction, PeakToPeak};
+use models::{Direction, Finger, PeakToPeak, SpringSlider};
 
 const NOISE: PassNoise = PassNoise { pass_relative_sd: 0.015, force_sd_n: 0.0008 };
 const MU0: f64 = 0.5;

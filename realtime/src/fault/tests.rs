@@ -18,12 +18,12 @@ fn at(cycle: u64) -> Nanos {
     Nanos(cycle * T)
 }
 
-fn fault(target: Target, mode: FaultMode, strength: f64) -> Fault {
+fn fault(target: FaultTarget, mode: FaultMode, strength: f64) -> Fault {
     Fault { target, mode, from: at(ACTS.start), until: at(ACTS.end), strength }
 }
 
 /// A fault that acts all the time.
-fn always(target: Target, mode: FaultMode, strength: f64) -> Fault {
+fn always(target: FaultTarget, mode: FaultMode, strength: f64) -> Fault {
     Fault { from: Nanos(0), until: Nanos(u64::MAX), ..fault(target, mode, strength) }
 }
 
@@ -140,9 +140,15 @@ fn the_dice_are_uniform_from_zero_to_below_one() {
 /// Two channels of one seed are not at fault together, and every bit of a seed counts.
 #[test]
 fn each_channel_and_each_seed_has_its_own_dice() {
-    let targets =
-        [Target::Lateral, Target::Normal, Target::Force, Target::Amplifier, Target::Drive, Target::Stage];
-    let first = |target: Target, seed: u64| Line::<Sample>::new([target, target], &[], seed).dice.bits();
+    let targets = [
+        FaultTarget::Lateral,
+        FaultTarget::Normal,
+        FaultTarget::Force,
+        FaultTarget::Amplifier,
+        FaultTarget::Drive,
+        FaultTarget::Stage,
+    ];
+    let first = |target: FaultTarget, seed: u64| Line::<Sample>::new([target, target], &[], seed).dice.bits();
     let mut seen = std::collections::HashSet::new();
     for target in targets {
         for seed in (0..64).map(|bit| 0xA5A5_5A5A_0000_0000 ^ (1 << bit)) {

@@ -11,12 +11,12 @@ use super::machine::{
 use super::{Grants, Lifeline, LoopReport, Pacing, panic_message};
 use crate::clock::Participant;
 use crate::cycle::{Config, CycleState};
+use crate::cycle_io::{Ports, Row, Tick, run_cycle};
 use crate::ports::{Nanos, SupplyCommand};
 use crate::queue::CommandQueue;
 use crate::safety::{DriveCommand, StageCommand};
-use crate::turn::{Ports, Row, Tick, turn};
 use hdrhistogram::Histogram;
-use models::prediction::FrictionModel;
+use models::FrictionModel;
 use ringbuf::HeapProd;
 use ringbuf::traits::Producer;
 use std::panic::AssertUnwindSafe;
@@ -110,7 +110,7 @@ pub fn run(parts: LoopParts, pacing: Pacing) -> LoopReport {
         let tick = Tick { number: cycles, lateness: Nanos(late), now };
         // A port is foreign code: if it panics, the drive goes off before anything else, and the loop ends.
         let turned = std::panic::catch_unwind(AssertUnwindSafe(|| {
-            turn(&config, &*model, &mut state, &mut ports, &mut || commands.pop(), tick)
+            run_cycle(&config, &*model, &mut state, &mut ports, &mut || commands.pop(), tick)
         }));
         let row = match turned {
             Ok(row) => row,

@@ -8,7 +8,7 @@ const LISTED: usize = 100;
 
 /// A stretch of a record that is no longer what was written.
 #[derive(Clone, Debug, PartialEq, Eq, Serialize)]
-pub struct Place {
+pub struct DamagedStretch {
     /// First byte of the stretch.
     pub from: u64,
     /// First byte behind it.
@@ -34,7 +34,7 @@ pub struct Integrity {
     /// Why the record ends before its proper end, if it does. What would have followed is not known.
     pub cut: Option<String>,
     /// Damaged stretches, the first hundred.
-    pub places: Vec<Place>,
+    pub places: Vec<DamagedStretch>,
     /// Damaged stretches in all.
     pub damaged_places: u64,
     /// Bytes that the damaged stretches hold together.
@@ -64,7 +64,7 @@ impl Integrity {
         self.damaged_places += 1;
         self.damaged_bytes += to.saturating_sub(from);
         if self.places.len() < LISTED {
-            self.places.push(Place { from, to, why });
+            self.places.push(DamagedStretch { from, to, why });
         }
     }
 
@@ -77,7 +77,9 @@ impl Integrity {
 
     /// The findings, one sentence each; empty if the record is complete.
     pub fn sentences(&self) -> Vec<String> {
-        let damaged = |Place { from, to, why }: &Place| format!("bytes {from} to {to} are damaged: {why}");
+        let damaged = |DamagedStretch { from, to, why }: &DamagedStretch| {
+            format!("bytes {from} to {to} are damaged: {why}")
+        };
         let mut list: Vec<String> = self.places.iter().map(damaged).collect();
         let unlisted = self.damaged_places - self.places.len() as u64;
         if unlisted > 0 {

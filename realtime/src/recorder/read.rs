@@ -5,12 +5,12 @@ use super::{RECOVERED, TOPICS, TRAILER, WRITTEN};
 use binrw::BinRead;
 use chunk::Message;
 use mcap::records::{ChunkHeader, op};
-use sound::{Sound, known, may_begin, sound};
 use std::collections::{BTreeMap, VecDeque};
 use std::io::{Cursor, Read, Seek, SeekFrom};
+use verify::{Verified, known, may_begin, verify};
 
 mod chunk;
-mod sound;
+mod verify;
 
 /// Something that a record holds.
 #[derive(Clone, Debug, PartialEq, Eq)]
@@ -175,7 +175,7 @@ impl<R: Read + Seek> Reader<R> {
     }
 
     /// Reads the record of the format that begins at `at`, where the file is read now; `None` at the end of the file.
-    fn record(&mut self, at: u64) -> Result<Option<(Sound, [u8; HEAD])>, Trouble> {
+    fn record(&mut self, at: u64) -> Result<Option<(Verified, [u8; HEAD])>, Trouble> {
         let size = self.size(at)?;
         let Some((opcode, length, head)) = self.head()? else { return Ok(None) };
         if !known(opcode) {
@@ -188,9 +188,9 @@ impl<R: Read + Seek> Reader<R> {
             return Err(Trouble::Short);
         }
         if self.is_outside(opcode) {
-            return Ok(Some((Sound::Nothing, head)));
+            return Ok(Some((Verified::Nothing, head)));
         }
-        let sound = sound(opcode, &self.body, self.wanted).map_err(Trouble::Bad);
+        let sound = verify(opcode, &self.body, self.wanted).map_err(Trouble::Bad);
         if sound.is_err() {
             self.in_vain += length + A_LOOK;
         }
@@ -307,20 +307,20 @@ impl<R: Read + Seek> Reader<R> {
             }
         };
         self.at += (HEAD + self.body.len()) as u64;
-        if !matches!(sound, Sound::DataEnd(_))
+        if !matches!(sound, Verified::DataEnd(_))
             && let Some(checksum) = &mut self.checksum
         {
             checksum.update(&head);
             checksum.update(&self.body);
         }
         match sound {
-            Sound::Nothing => {}
-            Sound::Chunk(messages) => self.messages = messages,
-            Sound::Entry(entry) => {
+            Verified::Nothing => {}
+            Verified::Chunk(messages) => self.messages = messages,
+            Verified::Entry(entry) => {
                 self.heard(&entry);
                 return Some(entry);
             }
-            Sound::DataEnd(stated) => {
+            Verified::DataEnd(stated) => {
                 let found = self.checksum.replace(crc32fast::Hasher::new()).map(|c| c.finalize());
                 if found.is_some_and(|found| found != stated) {
                     // Every chunk, attachment and fact has been checked by its own checksum: what is damaged lies between.

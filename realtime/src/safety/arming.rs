@@ -65,7 +65,7 @@ impl Cause {
 }
 
 /// What a cycle of arming looks at.
-pub(super) struct Step {
+pub(super) struct ArmingStep {
     /// The first broken rule, and the first one that [`Safety::excused`] does not excuse.
     pub broken: Option<Breach>,
     pub besides_the_cut: Option<Breach>,
@@ -77,7 +77,7 @@ pub(super) struct Step {
     pub now: Nanos,
 }
 
-impl Step {
+impl ArmingStep {
     /// Whether the second channel reads cut, or closed, by a sample taken since then.
     fn shows(&self, since: Nanos, cut: bool) -> bool {
         self.supply.is_ok_and(|s| s.taken_at > since && s.taken_at <= self.now && s.cut == cut)
@@ -101,7 +101,7 @@ impl Safety {
 
     /// What a reset that nobody but a program asks for would have to wait for: what is broken now, save what follows from a
     /// supply that was cut on purpose, and what only a person may put right; and missed deadlines that would trip the rig once armed.
-    pub(super) fn waits_for(&self, step: &Step) -> Option<Cause> {
+    pub(super) fn waits_for(&self, step: &ArmingStep) -> Option<Cause> {
         let besides = step.besides_the_cut.map(|breach| breach.cause);
         let fitted = step.supply != Err(NoData::NotFitted);
         match self.state {
@@ -123,7 +123,7 @@ impl Safety {
     }
 
     /// Moves from state to state. Enters what is new into the decision.
-    pub(super) fn advance(&mut self, step: &Step, decision: &mut Decision) {
+    pub(super) fn advance(&mut self, step: &ArmingStep, decision: &mut Decision) {
         match self.state {
             State::Armed { .. } => {
                 if let Some(breach) = step.broken {
@@ -142,7 +142,7 @@ impl Safety {
         }
     }
 
-    fn prove(&mut self, step: &Step, proof: Proof, since: Nanos, decision: &mut Decision) {
+    fn prove(&mut self, step: &ArmingStep, proof: Proof, since: Nanos, decision: &mut Decision) {
         let now = step.now;
         if let Some(breach) = step.besides_the_cut {
             return self.trip(breach, step, decision);
@@ -175,7 +175,7 @@ impl Safety {
         decision.armed_now = true;
     }
 
-    fn trip(&mut self, breach: Breach, step: &Step, decision: &mut Decision) {
+    fn trip(&mut self, breach: Breach, step: &ArmingStep, decision: &mut Decision) {
         let Breach { cause, value, bound, unit } = breach;
         // A sum with 0.0 is never -0.0, which a reader would see as a number below zero.
         let trip =

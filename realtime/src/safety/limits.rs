@@ -1,7 +1,7 @@
 //! The numbers: hard limits that no configuration can raise, and the soft limits of a setup.
 
 use crate::signals::Nanos;
-use models::quantity::PeakToPeak;
+use models::PeakToPeak;
 use serde::{Deserialize, Serialize};
 
 /// Limits that are compiled in. A setup may only stay below them.

@@ -5,7 +5,7 @@ use super::arming::{CutFor, SUPPLY_ACTS};
 use super::cause::{Cause, Unit};
 use super::watch::{ForceWatch, STAGE_RESPONSE, Watch};
 use super::{Controls, HARD, Limits, Observation, Remark, Request};
-use crate::signals::{AmplifierState, Channel, Contact, Nanos, NoData, SupplyCommand};
+use crate::signals::{AmplifierState, Channel, Nanos, NoData, SafetyContact, SupplyCommand};
 
 /// A rule and what it is for.
 #[derive(Clone, Copy)]
@@ -196,7 +196,7 @@ fn saturated(watch: &ForceWatch) -> Option<(f64, f64)> {
 }
 
 /// A contact that is fitted and not known to be closed; its age against the age limit, or that it is open.
-fn contact_open(c: &Context<'_>, contact: &Result<Contact, NoData>) -> Option<(f64, f64, Unit)> {
+fn contact_open(c: &Context<'_>, contact: &Result<SafetyContact, NoData>) -> Option<(f64, f64, Unit)> {
     let timing = &c.limits.timing.contacts;
     match contact {
         Err(NoData::NotFitted) => None,
@@ -210,7 +210,7 @@ fn contact_open(c: &Context<'_>, contact: &Result<Contact, NoData>) -> Option<(f
 }
 
 /// As [`contact_open`], save that what grew old while the loop stood still is not the fault of the contact.
-fn to_blame(c: &Context<'_>, contact: &Result<Contact, NoData>) -> Option<(f64, f64, Unit)> {
+fn to_blame(c: &Context<'_>, contact: &Result<SafetyContact, NoData>) -> Option<(f64, f64, Unit)> {
     contact_open(c, contact).filter(|(.., unit)| *unit == Unit::Flag || stood_still(c).is_none())
 }
 

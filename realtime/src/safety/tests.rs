@@ -2,7 +2,7 @@
 #![allow(clippy::disallowed_types)]
 
 use super::*;
-use crate::ports::{Contact, Quality, Sample};
+use crate::ports::{Quality, SafetyContact, Sample};
 use proptest::prelude::*;
 use std::sync::atomic::{AtomicU32, Ordering};
 

@@ -15,7 +15,7 @@ use axum::extract::ws::{self, WebSocket, WebSocketUpgrade};
 use axum::extract::{Path, State};
 use axum::http::StatusCode;
 use axum::response::{IntoResponse, Response};
-use runs::sequence::MeasuredPass;
+use runs::MeasuredPass;
 use serde::Deserialize;
 use serde_json::{Value, json};
 use std::collections::BTreeMap;

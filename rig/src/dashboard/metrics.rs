@@ -3,12 +3,12 @@
 
 use super::server::Shared;
 use super::{api, pages};
-use crate::live::{Heard, State, View, Viewer};
+use crate::live::{Received, State, View, Viewer};
 use axum::extract;
 use axum::http::header;
 use axum::response::{IntoResponse, Response};
+use runs::Event;
 use runs::job::LATENESS_BOUNDS_S;
-use runs::sequence::Event;
 use std::fmt::Write as _;
 use std::sync::atomic::Ordering;
 use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
@@ -67,9 +67,9 @@ fn follow(shared: &Arc<Shared>, name: &str) -> Option<Followed> {
     let take = move || {
         loop {
             match viewer.hear(POLL_EVERY) {
-                Heard::Message(message) => locked(&taken).take(*message),
-                Heard::Nothing => {}
-                Heard::Gone => break,
+                Received::Message(message) => locked(&taken).take(*message),
+                Received::Nothing => {}
+                Received::Gone => break,
             }
         }
         locked(&shared.followed).remove(&key);

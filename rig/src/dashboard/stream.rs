@@ -5,7 +5,7 @@
 use super::api::Server;
 use super::guard::PROTOCOL;
 use super::server::Shared;
-use crate::live::{Heard, Message, Viewer};
+use crate::live::{Message, Received, Viewer};
 use axum::extract::ws::{self, WebSocket, WebSocketUpgrade};
 use axum::extract::{Path, State};
 use axum::http::StatusCode;
@@ -92,9 +92,9 @@ pub fn hear(folder: &std::path::Path, shared: &Shared, to: &Sender<Message>) {
     let Ok(mut viewer) = Viewer::connect(folder) else { return };
     while !to.is_closed() {
         let message = match viewer.hear(POLL_EVERY) {
-            Heard::Message(message) => *message,
-            Heard::Nothing => continue,
-            Heard::Gone => return,
+            Received::Message(message) => *message,
+            Received::Nothing => continue,
+            Received::Gone => return,
         };
         if matches!(message, Message::State(_)) && to.max_capacity() - to.capacity() >= WITHOUT_STATES {
             shared.dropped.fetch_add(1, Ordering::Relaxed);

@@ -3,7 +3,7 @@
 use realtime::estimate::Moments;
 use realtime::ports::{Channel, Nanos, NoData, Quality, Sample};
 use realtime::safety::ChannelTiming;
-use runs::human::quantity;
+use runs::format::quantity;
 use serde::Serialize;
 
 /// Follows a channel that is read as by the loop.

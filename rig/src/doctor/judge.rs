@@ -1,11 +1,11 @@
 //! What was found, against what a run needs.
 
-use super::{Answers, ChannelReport, Found, Inspection};
+use super::{ChannelReport, Found, Inspection, LinkCounts};
 use drivers::OpenError;
-use realtime::ports::{AmplifierState, Contact, Contacts, NoData, Sample, StageState};
+use realtime::ports::{AmplifierState, Contacts, NoData, SafetyContact, Sample, StageState};
 use realtime::safety::RULES;
-use runs::human::quantity;
-use runs::plan::Plan;
+use runs::Plan;
+use runs::format::quantity;
 use runs::setup::{Setup, THERMOMETER};
 use serde::Serialize;
 
@@ -42,7 +42,7 @@ impl Finding {
 }
 
 /// What the inspection is judged for.
-pub struct Target<'a> {
+pub struct InspectionScope<'a> {
     /// The rig.
     pub setup: &'a Setup,
     /// The plan that is to run, where one is named.
@@ -73,7 +73,7 @@ const LINK: &str = "check cable and power, and what else talks on this line";
 const UNIT: &str = "check unit, factor, type and byte order of the signal in its profile, and `gain`";
 
 /// Judges what was found: one finding an instrument, one of the sweep, one of the plan.
-pub fn judge(inspected: &Inspection, target: &Target<'_>) -> Vec<Finding> {
+pub fn judge(inspected: &Inspection, target: &InspectionScope<'_>) -> Vec<Finding> {
     let mut instruments: Vec<Finding> =
         inspected.found.iter().map(|found| instrument(found, inspected, target)).collect();
     let mended = instruments.iter().all(|f| f.good);
@@ -115,7 +115,7 @@ fn stalled(inspected: &Inspection) -> Option<Finding> {
     })
 }
 
-fn instrument(found: &Found, inspected: &Inspection, target: &Target<'_>) -> Finding {
+fn instrument(found: &Found, inspected: &Inspection, target: &InspectionScope<'_>) -> Finding {
     let subject = format!("{} `{}` at {}", found.role, found.id, found.address);
     let answers = match &found.answers {
         Ok(answers) => answers,
@@ -224,7 +224,7 @@ fn saturated(c: &ChannelReport, problems: &mut Vec<Problem>) {
     }
 }
 
-fn linked(answers: &Answers, problems: &mut Vec<Problem>) {
+fn linked(answers: &LinkCounts, problems: &mut Vec<Problem>) {
     if answers.bad_share > BAD_SHARE {
         problems.push((format!("{:.0} % of its answers are none", answers.bad_share * 1e2), LINK));
     }
@@ -244,7 +244,7 @@ fn linked(answers: &Answers, problems: &mut Vec<Problem>) {
 }
 
 /// Values of an axis of force at rest.
-fn force(c: &ChannelReport, target: &Target<'_>, problems: &mut Vec<Problem>) {
+fn force(c: &ChannelReport, target: &InspectionScope<'_>, problems: &mut Vec<Problem>) {
     let (limits, name) = (&target.setup.config.limits, c.name);
     let most = if name == "normal" { limits.normal_force_max_n } else { limits.lateral_force_max_n };
     let frozen_after = limits.frozen_after;
@@ -326,7 +326,7 @@ fn stage(s: StageState, setup: &Setup, problems: &mut Vec<Problem>) -> String {
 }
 
 fn contacts(c: &Contacts, states: &mut Vec<String>, problems: &mut Vec<Problem>) {
-    let mut one = |name: &str, contact: Result<Contact, NoData>, needed: bool| match contact {
+    let mut one = |name: &str, contact: Result<SafetyContact, NoData>, needed: bool| match contact {
         Err(NoData::NotFitted) => {}
         Err(why) => problems.push((format!("{name}: {why}"), LINK)),
         Ok(contact) => {
@@ -431,7 +431,7 @@ mod tests {
             role: "force",
             id: "muprime-force2".into(),
             address: "127.0.0.1:1".into(),
-            answers: Ok(Answers::default()),
+            answers: Ok(LinkCounts::default()),
             channels: vec![channel],
         };
         let stalls = StallReport { count: stalls, worst: Nanos(21_400_000), latest: Vec::new() };
@@ -451,7 +451,7 @@ mod tests {
     fn stalls_of_this_computer_are_reported_where_samples_came_late() {
         let setup = Setup::load("virtual-ideal").unwrap();
         let of_computer = |inspected: &Inspection| {
-            let findings = judge(inspected, &Target { setup: &setup, plan: None });
+            let findings = judge(inspected, &InspectionScope { setup: &setup, plan: None });
             let of = |what: &str| findings.iter().find(|f| f.subject.starts_with(what)).cloned();
             let force = of("force").unwrap();
             let computer = of("this computer");

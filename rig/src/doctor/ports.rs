@@ -7,7 +7,7 @@ use drivers::{HealthReport, InstrumentSetup, InstrumentsSetup, Links, OpenError,
 use instruments::Profile;
 use realtime::ports::{Amplifier, Contacts, ForceSensor, Nanos, NoData, SafetyInputs, Stage, SupplySwitch};
 use realtime::safety::Observation;
-use runs::setup::Setup;
+use runs::Setup;
 use std::time::Instant;
 
 /// An instrument, and its link where it could be opened.

@@ -2,8 +2,8 @@
 #![allow(clippy::disallowed_methods, reason = "threads beside everything else")]
 
 use super::{Ask, Ended, Message, Progress, Run, State, TimedEvent, View, is_ours, place};
+use runs::MeasuredPass;
 use runs::job::{Signals, Update};
-use runs::sequence::MeasuredPass;
 use rustix::net::sockopt::socket_peercred;
 use std::io::{self, BufRead, BufReader, Read, Write};
 use std::os::unix::net::{UnixListener, UnixStream};

@@ -1,11 +1,10 @@
 //! The messages of a run in progress.
 
-use realtime::cycle::Phase;
 use realtime::ports::Channel;
-use realtime::safety::Cause;
+use realtime::{Cause, Phase};
 use runs::job::{Deadlines, Extremes, Job, Snapshot, unix_ns};
-use runs::sequence::{Event, MeasuredPass, Outcome};
 use runs::setup::Guards;
+use runs::{Event, MeasuredPass, Outcome};
 use serde::{Deserialize, Serialize};
 use std::path::PathBuf;
 

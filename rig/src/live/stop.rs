@@ -1,9 +1,9 @@
 //! A stop that comes from outside a run's process, and is answered as done only where the run shows it.
 #![allow(clippy::disallowed_methods, reason = "somebody waits for a run to stop")]
 
-use super::{Ask, Heard, Message, Viewer};
+use super::{Ask, Message, Received, Viewer};
+use runs::Event;
 use runs::run_dir;
-use runs::sequence::Event;
 use rustix::process::{Pid, Signal, kill_process};
 use std::collections::BTreeSet;
 use std::path::{Path, PathBuf};
@@ -57,16 +57,16 @@ fn shows(mut viewer: Option<&mut Viewer>, folder: &Path, within: Duration) -> bo
     let until = Instant::now() + within;
     while Instant::now() < until {
         match viewer.as_mut().map(|viewer| viewer.hear(POLL_EVERY)) {
-            Some(Heard::Message(message)) => match *message {
+            Some(Received::Message(message)) => match *message {
                 Message::Ended(_) => return true,
                 Message::Event(event) if matches!(event.event, Event::StopRequested | Event::Tripped(_)) => {
                     return true;
                 }
                 _ => {}
             },
-            Some(Heard::Gone) => viewer = None,
+            Some(Received::Gone) => viewer = None,
             _ if !run_dir::is_held(folder) => return true,
-            Some(Heard::Nothing) => {}
+            Some(Received::Nothing) => {}
             None => std::thread::sleep(POLL_EVERY),
         }
     }

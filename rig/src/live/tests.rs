@@ -1,10 +1,9 @@
 #![allow(clippy::disallowed_methods, reason = "waits for threads of the system")]
 
 use super::*;
-use models::condition::Condition;
-use models::pass::Pass;
+use models::{Condition, Pass};
 use runs::job::{Signals, Update};
-use runs::sequence::{Event, MeasuredPass};
+use runs::{Event, MeasuredPass};
 use std::io::{Read, Write};
 use std::os::unix::net::UnixStream;
 use std::sync::atomic::Ordering;
@@ -49,9 +48,9 @@ fn seen(viewer: &mut Viewer, view: &mut View, done: impl Fn(&View) -> bool) {
     while !done(view) {
         assert!(began.elapsed() < SOON, "{view:?}");
         match viewer.hear(Duration::from_millis(20)) {
-            Heard::Message(message) => view.take(*message),
-            Heard::Nothing => {}
-            Heard::Gone => panic!("the feed is gone: {view:?}"),
+            Received::Message(message) => view.take(*message),
+            Received::Nothing => {}
+            Received::Gone => panic!("the feed is gone: {view:?}"),
         }
     }
 }
@@ -74,7 +73,7 @@ fn whoever_comes_late_has_the_same_picture() {
     assert_eq!(view.passes.iter().map(|p| p.pass.point).collect::<Vec<_>>(), [1, 2, 3]);
     feed.end(Ended { outcome: None, remedy: None, error: Some("x".into()), off: None, agreement: None });
     seen(&mut late, &mut same, |view| view.ended.is_some());
-    assert_eq!(late.hear(SOON), Heard::Gone);
+    assert_eq!(late.hear(SOON), Received::Gone);
     assert!(Viewer::connect(folder.path()).is_err(), "it is over");
 }
 

@@ -2,7 +2,7 @@
 
 use super::{Ended, Message, Progress, Run, State, TimedEvent};
 use realtime::safety::Trip;
-use runs::sequence::{Event, MeasuredPass};
+use runs::{Event, MeasuredPass};
 use std::collections::VecDeque;
 
 /// States that are remembered: a minute of them.

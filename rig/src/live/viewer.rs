@@ -9,7 +9,7 @@ use std::time::Duration;
 
 /// What was heard of a run.
 #[derive(Clone, Debug, PartialEq)]
-pub enum Heard {
+pub enum Received {
     /// A message.
     Message(Box<Message>),
     /// Nothing within the time that was given.
@@ -42,9 +42,9 @@ impl Viewer {
     }
 
     /// Waits for a message, so long at most. Messages of a later version that this one does not know are passed over.
-    pub fn hear(&mut self, at_most: Duration) -> Heard {
+    pub fn hear(&mut self, at_most: Duration) -> Received {
         if self.reader.get_ref().set_read_timeout(Some(at_most.max(Duration::from_millis(1)))).is_err() {
-            return Heard::Gone;
+            return Received::Gone;
         }
         loop {
             match self.reader.read_line(&mut self.begun) {
@@ -52,14 +52,14 @@ impl Viewer {
                     let message = serde_json::from_str(&self.begun);
                     self.begun.clear();
                     if let Ok(message) = message {
-                        return Heard::Message(Box::new(message));
+                        return Received::Message(Box::new(message));
                     }
                 }
                 Err(why) if matches!(why.kind(), io::ErrorKind::WouldBlock | io::ErrorKind::TimedOut) => {
-                    return Heard::Nothing;
+                    return Received::Nothing;
                 }
                 Err(why) if why.kind() == io::ErrorKind::Interrupted => {}
-                Ok(_) | Err(_) => return Heard::Gone,
+                Ok(_) | Err(_) => return Received::Gone,
             }
         }
     }

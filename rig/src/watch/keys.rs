@@ -3,7 +3,7 @@
 use super::{Shared, Source};
 use crate::live::{self, Ask};
 use crate::terminal;
-use runs::job::Signals;
+use runs::Signals;
 use std::io;
 use std::path::Path;
 use std::sync::atomic::Ordering;

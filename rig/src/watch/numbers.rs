@@ -1,8 +1,8 @@
 //! What is seen of a run in words and numbers. Missing data is 'none', never 0.
 
 use crate::live::{State, View};
-use realtime::cycle::Phase;
-use runs::human::number;
+use realtime::Phase;
+use runs::format::number;
 use runs::print::clean;
 
 /// States of the last second.

@@ -10,9 +10,9 @@ use calibration::certificate::date;
 use ratatui_core::buffer::Buffer;
 use ratatui_core::layout::Rect;
 use ratatui_core::style::{Color, Style};
-use realtime::safety::Cause;
+use realtime::Cause;
+use runs::Outcome;
 use runs::report::events::describe;
-use runs::sequence::Outcome;
 
 /// Columns and rows from which on the whole page is shown.
 const WHOLE: [u16; 2] = [80, 24];

@@ -1,8 +1,8 @@
 //! Hears a run: by its feed where one can be had, else by looking into its folder.
 
 use super::{Shared, Source};
-use crate::live::{Ended, Heard, Progress, Run, Viewer};
-use runs::job::Summary;
+use crate::live::{Ended, Progress, Received, Run, Viewer};
+use runs::Summary;
 use runs::run_dir::{self, passes_in};
 use runs::setup::Guards;
 use std::path::Path;
@@ -37,14 +37,14 @@ fn follow(shared: &Shared, mut viewer: Viewer) {
     shared.hand.reach(viewer.asking().ok().map(|ask| Box::new(ask) as _));
     while !shared.is_over() {
         match viewer.hear(HEAR_FOR) {
-            Heard::Message(message) => {
+            Received::Message(message) => {
                 let mut seen = shared.seen();
                 seen.source = Source::Feed;
                 seen.heard = Instant::now();
                 seen.view.take(*message);
             }
-            Heard::Nothing => {}
-            Heard::Gone => break,
+            Received::Nothing => {}
+            Received::Gone => break,
         }
     }
     shared.hand.reach(None);

@@ -1,15 +1,13 @@
 use super::*;
 use crate::live::{Ended, Message, Progress, Run, State, TimedEvent};
-use models::condition::Condition;
-use models::pass::Pass;
+use models::{Condition, Pass};
 use ratatui_core::buffer::Buffer;
 use ratatui_core::layout::Rect;
 use realtime::compare::PassComparison;
-use realtime::cycle::Phase;
-use realtime::ports::Nanos;
 use realtime::safety::{Cause, Trip, Unit};
+use realtime::{Nanos, Phase};
 use runs::job::Extremes;
-use runs::sequence::{Event, MeasuredPass, Outcome};
+use runs::{Event, MeasuredPass, Outcome};
 
 const PLAIN: Look = Look { colour: false, unicode: false };
 

@@ -1,7 +1,7 @@
 //! A small picture of a run: measured `mu'` against amplitude, as SVG that needs nothing else.
 
-use crate::sequence::MeasuredPass;
-use models::quantity::PeakToPeak;
+use crate::sweep::MeasuredPass;
+use models::PeakToPeak;
 use std::fmt::Write;
 
 /// Width and height in px.

@@ -1,12 +1,11 @@
 //! Two runs' folders compared: statistics, what must be minded, what differed.
 
 use super::differences::{Difference, between, warnings};
-use super::{Answer, Comparison, Judged, Reference, Side, compare};
-use crate::run_data::RunData;
+use super::{Comparison, ComparisonAnswer, Judged, Reference, Side, compare};
 use crate::run_dir::{record_facts, records_in};
-use crate::sequence::Outcome;
+use crate::{Outcome, RunData};
 use miette::{IntoDiagnostic, WrapErr};
-use models::rig_file::PassNoise;
+use models::PassNoise;
 use serde::Serialize;
 use std::path::{Path, PathBuf};
 
@@ -42,8 +41,8 @@ impl Compared {
         let [table_a, table_b] = folders.map(|folder| std::fs::read(folder.join("points.csv")).ok());
         let mut warnings = warnings(&facts_a, &facts_b, table_a == table_b);
         // Of two runs whose noise is one a difference is a difference; likeness shows nothing.
-        let alike = |j: &&mut Judged| !warnings.is_empty() && j.answer == Answer::NoDifferenceSeen;
-        comparison.judged.iter_mut().filter(alike).for_each(|j| j.answer = Answer::NotIndependent);
+        let alike = |j: &&mut Judged| !warnings.is_empty() && j.answer == ComparisonAnswer::NoDifferenceSeen;
+        comparison.judged.iter_mut().filter(alike).for_each(|j| j.answer = ComparisonAnswer::NotIndependent);
         for (folder, run) in folders.into_iter().zip([&a, &b]) {
             warnings.extend(run.damage.iter().map(|d| format!("{}: {d}", folder.display())));
         }

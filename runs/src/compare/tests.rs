@@ -1,6 +1,5 @@
 use super::*;
-use models::condition::Condition;
-use models::quantity::Direction;
+use models::{Condition, Direction};
 use rand::SeedableRng;
 use rand_chacha::ChaCha12Rng;
 
@@ -75,7 +74,7 @@ fn pairs_without_a_difference_have_uniform_p_values_and_intervals_cover() {
         ratios.push(j.mu0_p);
         furthest += usize::from(j.furthest_p < LEVEL / 4.0);
         covered += usize::from(j.shift_interval_95[0] <= 0.0 && 0.0 <= j.shift_interval_95[1]);
-        differ += usize::from(j.answer == Answer::Differ);
+        differ += usize::from(j.answer == ComparisonAnswer::Differ);
     }
     // Kolmogorov: at n = 2000 the distance is beyond 0.0436 once in a thousand.
     let [shift, scatter, mu0] = [shifts, scatters, ratios].map(distance);
@@ -144,7 +143,7 @@ fn a_change_at_one_condition_is_seen_among_many() {
     let j = found.judged.as_ref().unwrap();
     assert!(j.shift_p > 0.1 && j.scatter_p > 0.1, "{j:?}");
     assert!(j.furthest_p < 1e-3 && j.visible_at_one < 0.06, "{j:?}");
-    assert_eq!((j.answer, &j.differ_in[..]), (Answer::Differ, &["mu_relative"][..]));
+    assert_eq!((j.answer, &j.differ_in[..]), (ComparisonAnswer::Differ, &["mu_relative"][..]));
     assert!(found.answer_words().starts_with("the runs differ in mu' by"), "{}", found.answer_words());
     assert!(found.figures_words()[2].starts_with("furthest: +0.045 +- 0.010 at"));
 }
@@ -185,7 +184,7 @@ fn the_common_shift_is_that_of_the_full_matrix() {
     assert!((j.scatter_chi2 - chi2).abs() < 1e-9, "{} {chi2}", j.scatter_chi2);
     // A single condition has no scatter, and few conditions never agree.
     let one = judge(&pairs[..1], &references).unwrap();
-    assert_eq!((one.scatter_p, one.answer), (1.0, Answer::CannotTell));
+    assert_eq!((one.scatter_p, one.answer), (1.0, ComparisonAnswer::CannotTell));
     assert!(judge(&[], &references).is_none());
 }
 

@@ -34,7 +34,7 @@ pub struct Dynamics {
 
 /// What one part leaves of a sine.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
-pub struct Part {
+pub struct ChainStage {
     /// Name: `plate`, `loop`, `sensor`.
     pub name: String,
     /// Frequency in Hz at which it alone leaves 0.707; none where it never does.
@@ -98,8 +98,8 @@ impl Dynamics {
     }
 
     /// The parts, by name.
-    pub fn parts(&self) -> Vec<Part> {
-        let part = |name: &str, corner_hz, delay_s| Part { name: name.into(), corner_hz, delay_s };
+    pub fn parts(&self) -> Vec<ChainStage> {
+        let part = |name: &str, corner_hz, delay_s| ChainStage { name: name.into(), corner_hz, delay_s };
         vec![
             part("plate", self.corner(|hz| self.plate(hz)), self.ring_time_s + self.amplifier_s),
             part("loop", self.corner(|hz| self.hold(hz)), 1.5 * self.cycle_s),

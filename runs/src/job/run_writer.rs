@@ -4,24 +4,21 @@
 
 use super::{Job, Notes, Summary, Unfinished, Update};
 use crate::ambient::levels_of;
-use crate::files::Placed;
+use crate::files::GuardedFile;
 use crate::run_data::remarks::Remarked;
 use crate::run_dir::{RunDir, SUMMARY};
-use crate::sequence::{Event, MeasuredPass, Outcome, Zero, Zeros};
 use crate::setup::Guards;
 use crate::supervisor::OffReport;
+use crate::sweep::{Event, MeasuredPass, Outcome, Zero, Zeros};
 use miette::{IntoDiagnostic, WrapErr};
-use models::finger::Finger;
-use models::law::BuiltIn;
-use models::prediction::FrictionModel;
+use models::{BuiltIn, Finger, FrictionModel};
 use realtime::clock::HeldBack;
 use realtime::compare::Agreement;
 use realtime::cycle::Config;
 use realtime::pacing::LoopReport;
-use realtime::ports::Nanos;
 use realtime::recorder::Preamble;
-use realtime::safety::Cause;
 use realtime::stall_monitor::StallReport;
+use realtime::{Cause, Nanos};
 use serde::{Deserialize, Serialize};
 use std::collections::BTreeMap;
 use std::time::{SystemTime, UNIX_EPOCH};
@@ -257,7 +254,7 @@ impl RunWriter {
     }
 
     /// A new record file of the run.
-    pub fn new_record(&self) -> miette::Result<Placed> {
+    pub fn new_record(&self) -> miette::Result<GuardedFile> {
         self.dir.new_record().wrap_err(Unfinished::NotSaved)
     }
 }

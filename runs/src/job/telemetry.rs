@@ -1,15 +1,15 @@
 //! Snapshots of the loop for viewers: one cycle in a hundred milliseconds, and the extremes of all cycles, so
 //! that a spike between two snapshots is seen.
 
+use realtime::Row;
 use realtime::ports::{Channel, Nanos};
-use realtime::turn::Row;
 use serde::{Deserialize, Serialize};
 
 /// Time between two snapshots.
 const EVERY: Nanos = Nanos(100_000_000);
 
 /// Least and greatest value of a channel.
-pub type Span = Option<[f64; 2]>;
+pub type ValueRange = Option<[f64; 2]>;
 
 /// Extremes of all cycles since the last snapshot; `None` where a channel gave nothing.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Serialize, Deserialize)]
@@ -17,13 +17,13 @@ pub struct Extremes {
     /// Cycles that they are of.
     pub cycles: u32,
     /// Lateral force in N.
-    pub lateral_force_n: Span,
+    pub lateral_force_n: ValueRange,
     /// Normal force in N.
-    pub normal_force_n: Span,
+    pub normal_force_n: ValueRange,
     /// Peak-to-peak amplitude in m.
-    pub amplitude_pp_m: Span,
+    pub amplitude_pp_m: ValueRange,
     /// Running `mu'`.
-    pub mu_relative: Span,
+    pub mu_relative: ValueRange,
     /// Latest beginning of a cycle in s.
     pub lateness_s: f64,
 }
@@ -41,7 +41,7 @@ impl Extremes {
     }
 }
 
-fn widen(span: &mut Span, value: Option<f64>) {
+fn widen(span: &mut ValueRange, value: Option<f64>) {
     let Some(value) = value else { return };
     *span = Some(span.map_or([value; 2], |[least, greatest]| [least.min(value), greatest.max(value)]));
 }

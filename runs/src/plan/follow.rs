@@ -3,13 +3,11 @@
 
 use super::{Plan, Point};
 use crate::fidelity::dynamics::Dynamics;
-use crate::human::{number, quantity};
+use crate::format::{number, quantity};
 use crate::input::{Problems, place_of};
-use models::condition::Condition;
 use models::inverse::{Reach, quick};
-use models::prediction::FrictionModel;
-use models::target::Target;
-use realtime::safety::Limits;
+use models::{Condition, FrictionModel, Target};
+use realtime::Limits;
 use std::f64::consts::TAU;
 
 /// Cycles of the loop in one period of the target at least.

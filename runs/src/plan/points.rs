@@ -1,11 +1,9 @@
 //! From a plan to its passes, each checked against the limits before anything moves.
 
 use super::Plan;
-use crate::human::quantity;
+use crate::format::quantity;
 use crate::input::{self, BadInput, Problems, unit_meant};
-use models::condition::{Ambient, Condition};
-use models::covariate::Covariate;
-use models::quantity::{Direction, PeakToPeak};
+use models::{Ambient, Condition, Covariate, Direction, PeakToPeak};
 use rand::SeedableRng;
 use rand::seq::SliceRandom;
 use rand_chacha::ChaCha12Rng;

@@ -2,11 +2,9 @@
 //! middle of its sweep.
 
 use super::{PassTimes, Plan, Point};
-use crate::human::quantity;
+use crate::format::quantity;
 use crate::input::{Problems, place_of};
-use models::condition::Condition;
-use models::covariate::Covariate;
-use models::quantity::PeakToPeak;
+use models::{Condition, Covariate, PeakToPeak};
 
 /// The values of one setting that an instrument takes or sees, or that a limit allows.
 #[derive(Clone, Debug, PartialEq)]

@@ -4,7 +4,7 @@ mod file;
 
 use super::{Plan, Series};
 use crate::fidelity::dynamics::Dynamics;
-use crate::human::quantity;
+use crate::format::quantity;
 use crate::input::Problems;
 use models::target::{Feedback, MOST_DELAY, Target};
 use rand::{RngExt, SeedableRng};

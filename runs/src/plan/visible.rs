@@ -3,11 +3,10 @@
 
 use super::points::{Visit, series_place};
 use super::{Plan, Point, Resolution};
-use crate::human::quantity;
+use crate::format::quantity;
 use crate::input::BadInput;
-use diagnosis::next::grid::expected_change_n;
-use models::condition::Condition;
-use models::prediction::FrictionModel;
+use diagnosis::report::next::grid::expected_change_n;
+use models::{Condition, FrictionModel};
 
 /// Counts of the sensor that the largest expected change of a series must span. One count either way is
 /// rounding of the two readings whose difference is taken; four leave a curve of some shape.
@@ -101,10 +100,8 @@ impl Plan {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use models::finger::Finger;
-    use models::prediction::SpringSlider;
-    use realtime::ports::Nanos;
-    use realtime::safety::Limits;
+    use models::{Finger, SpringSlider};
+    use realtime::{Limits, Nanos};
 
     const PLAN: &str = r#"
 name = "p"

@@ -4,8 +4,8 @@ use super::html::{cell, column, columns, escape, glossary, list, note, numeric, 
 use super::plots;
 use crate::ambient::air_words;
 use crate::compare::differences::Difference;
-use crate::compare::{Answer, Compared, Comparison, Mean, Paired};
-use models::condition::Ambient;
+use crate::compare::{Compared, Comparison, ComparisonAnswer, Mean, Paired};
+use models::Ambient;
 use std::fmt::Write;
 use std::path::Path;
 
@@ -21,9 +21,9 @@ pub fn page(compared: &Compared) -> miette::Result<String> {
     w.push_str(&about(compared, &a, &b));
     let conditions = result.pairs.len();
     let class = match result.answer() {
-        Answer::Differ => " departed",
-        Answer::NoDifferenceSeen => "",
-        Answer::CannotTell | Answer::NotIndependent => " undecided",
+        ComparisonAnswer::Differ => " departed",
+        ComparisonAnswer::NoDifferenceSeen => "",
+        ComparisonAnswer::CannotTell | ComparisonAnswer::NotIndependent => " undecided",
     };
     let _ = write!(
         w,

@@ -2,10 +2,10 @@
 
 use super::html::{columns, escape, table};
 use crate::ambient::AIR;
-use crate::human::number;
+use crate::format::number;
 use crate::run_data::remarks::ZERO_SHARE;
-use crate::sequence::Event;
-use realtime::safety::Cause;
+use crate::sweep::Event;
+use realtime::Cause;
 
 /// An event in words.
 pub fn describe(event: &Event) -> String {

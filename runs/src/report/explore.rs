@@ -3,11 +3,10 @@
 
 use super::events::describe;
 use super::traces::Trace;
-use crate::human::rounded;
+use crate::format::rounded;
 use crate::job::{REPLAYABLE, Replayable};
-use crate::run_data::RunData;
-use crate::sequence::MeasuredPass;
-use models::quantity::PeakToPeak;
+use crate::{MeasuredPass, RunData};
+use models::PeakToPeak;
 
 /// The figures of the dashboard and of a run's page, a module.
 pub const FIGURES: &str = include_str!("assets/plots.js");

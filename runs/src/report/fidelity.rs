@@ -2,9 +2,9 @@
 
 use super::html::{columns, escape, list, note, table};
 use super::plots::fidelity::{key, over_position, transfer};
-use crate::fidelity::dynamics::Part;
+use crate::fidelity::dynamics::ChainStage;
 use crate::fidelity::{Fidelity, Group, Late};
-use crate::human::{number, quantity};
+use crate::format::{number, quantity};
 use std::fmt::Write;
 
 /// Groups whose profile is drawn.
@@ -19,7 +19,7 @@ fn ends(group: &Group) -> String {
         (None, Some(known)) => format!("the known dynamics end at {known:.1} Hz"),
         (None, None) => "the dynamics are not known".into(),
     };
-    let part = |p: &Part| Some(format!("{} {:.0} Hz", p.name, p.corner_hz?));
+    let part = |p: &ChainStage| Some(format!("{} {:.0} Hz", p.name, p.corner_hz?));
     let parts: Vec<String> = group.parts.iter().filter_map(part).collect();
     if !parts.is_empty() {
         let _ = write!(text, " (each alone: {})", parts.join(", "));

@@ -5,7 +5,7 @@ use super::explore::{place, script};
 use super::html::{cell, column, columns, escape, glossary, list, note, numeric, row, shell, table};
 use super::plots::comparison::{group_differences, group_overlay};
 use crate::compare::groups::{AtCondition, Group, GroupBy, Grouped};
-use models::condition::Ambient;
+use models::Ambient;
 use std::fmt::Write;
 use std::path::PathBuf;
 

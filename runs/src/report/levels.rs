@@ -1,7 +1,7 @@
 //! Levels of a setting: passes of one setting are measured at values that scatter, and a figure shows them as
 //! one.
 
-use crate::human::number;
+use crate::format::number;
 
 /// How far, as a share, the values of one frequency, of one speed and of one normal force lie apart.
 pub const FREQUENCY: f64 = 0.01;

@@ -6,11 +6,11 @@ use super::published::Published;
 use super::traces::Trace;
 use super::{events, explore, fidelity, plots, published};
 use crate::ambient::{AIR, LevelsFound, levels_of};
-use crate::human::number;
+use crate::format::number;
 use crate::input::unit_of;
 use crate::run_data::{RunData, remarks};
-use crate::sequence::{Outcome, Zeros};
-use models::condition::Ambient;
+use crate::sweep::{Outcome, Zeros};
+use models::Ambient;
 use std::fmt::Write;
 
 pub(super) fn page(run: &RunData, traces: &[Trace], overlay: &[Published]) -> miette::Result<String> {

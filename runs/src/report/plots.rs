@@ -60,25 +60,25 @@ fn capital(word: &str) -> String {
 
 /// One axis from end to end.
 #[derive(Clone, Copy, Debug)]
-pub struct Span {
+pub struct AxisRange {
     low: f64,
     high: f64,
     logarithmic: bool,
 }
 
-impl Span {
+impl AxisRange {
     fn linear(range: Range<f64>) -> Self {
-        Span { low: range.start, high: range.end, logarithmic: false }
+        AxisRange { low: range.start, high: range.end, logarithmic: false }
     }
 
     fn logarithmic(range: Range<f64>) -> Self {
-        Span { low: range.start, high: range.end, logarithmic: true }
+        AxisRange { low: range.start, high: range.end, logarithmic: true }
     }
 
     /// From zero on, over all of these values.
     pub fn from_zero(values: impl Iterator<Item = f64>) -> Self {
         let (low, high) = values.fold((0.0f64, 0.0f64), |(l, h), v| (l.min(v), h.max(v)));
-        Span::linear(low..high + 0.05 * (high - low).max(1e-300))
+        AxisRange::linear(low..high + 0.05 * (high - low).max(1e-300))
     }
 
     /// Over all of these values with a margin, logarithmic where it may be and they span more than a decade:
@@ -87,15 +87,15 @@ impl Span {
         let [low, high] = ends(values);
         if logarithmic && low > 0.0 && high > 10.0 * low {
             let margin = (high / low).powf(0.04);
-            return Span::logarithmic(low / margin..high * margin);
+            return AxisRange::logarithmic(low / margin..high * margin);
         }
         let margin = 0.04 * (high - low).max(1e-12 * high.abs().max(1e-300));
-        Span::linear(low - margin..high + margin)
+        AxisRange::linear(low - margin..high + margin)
     }
 
     /// So many places along it, the lower end left out.
     pub fn places(&self, n: u32) -> impl Iterator<Item = f64> + use<> {
-        let Span { low, high, logarithmic } = *self;
+        let AxisRange { low, high, logarithmic } = *self;
         (1..=n).map(move |k| {
             let share = f64::from(k) / f64::from(n);
             if logarithmic { low * (high / low).powf(share) } else { low + share * (high - low) }
@@ -170,8 +170,8 @@ type Chart<'a> = ChartContext<'a, SVGBackend<'a>, Cartesian2d<Axis, Axis>>;
 /// sentence for who cannot see it. `draw` puts the curves in and gets the size of a mark.
 fn figure(
     wide: (u32, u32),
-    x: (Span, &str),
-    y: (Span, &str),
+    x: (AxisRange, &str),
+    y: (AxisRange, &str),
     alt: &str,
     draw: impl for<'a> Fn(&mut Chart<'a>, u32) -> miette::Result<()>,
 ) -> miette::Result<String> {
@@ -349,8 +349,8 @@ fn band(
 }
 
 /// The axis of `mu'` between two ends.
-fn mu_on([low, high]: [f64; 2]) -> (Span, &'static str) {
-    (Span::linear(low..high), "relative friction \u{3bc}'")
+fn mu_on([low, high]: [f64; 2]) -> (AxisRange, &'static str) {
+    (AxisRange::linear(low..high), "relative friction \u{3bc}'")
 }
 
 /// The axis of `mu'` over measured values: a mark is drawn where it was measured, but for a few that would
@@ -429,7 +429,7 @@ mod tests {
 
     #[test]
     fn a_zero_on_an_axis_has_no_sign() {
-        let axis = Span::linear(-0.1..0.1).axis();
+        let axis = AxisRange::linear(-0.1..0.1).axis();
         assert_eq!([-1e-18, -0.05].map(|v| axis.format_ext(&v)), ["0.0", "-0.05"]);
     }
 
@@ -443,7 +443,7 @@ mod tests {
     /// 5 to 50 mm/s had one label, 10.
     #[test]
     fn a_logarithmic_axis_of_one_decade_has_a_scale() {
-        let ticks = |low, high| Span::over([low, high].into_iter(), true).axis().key_points(5);
+        let ticks = |low, high| AxisRange::over([low, high].into_iter(), true).axis().key_points(5);
         assert_eq!(ticks(4.99, 50.01), [5.0, 10.0, 20.0, 50.0]);
         assert_eq!(ticks(0.01, 20.0), [0.01, 0.1, 1.0, 10.0]);
     }

@@ -3,7 +3,7 @@
 
 use super::html::{cell, columns, escape, note, numeric, row, table};
 use super::plots::published::panels;
-use crate::human::number;
+use crate::format::number;
 use crate::input::{MAX_TABLE_BYTES, bytes_of};
 use crate::run_data::RunData;
 use miette::WrapErr;

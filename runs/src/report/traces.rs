@@ -2,9 +2,8 @@
 //! An error is a record that cannot be opened; what is damaged is left out.
 
 use crate::run_dir::{open_record, records_in};
-use realtime::cycle::Phase;
 use realtime::recorder::{self, Entry};
-use realtime::turn::Row;
+use realtime::{Phase, Row};
 use serde::Serialize;
 use std::path::Path;
 

@@ -1,8 +1,8 @@
 //! What a reader must know of a run: when, who, on what, with which rig and which certificates.
 
-use crate::human::quantity;
+use crate::format::quantity;
 use crate::run_dir::began;
-use models::rig_file::RigFile;
+use models::RigFile;
 use std::collections::BTreeMap;
 use std::path::Path;
 

@@ -1,9 +1,9 @@
 //! The remarks of a run's summary and page: what a reader must know of its passes.
 
 use crate::job::Summary;
-use crate::sequence::{MeasuredPass, Zero, Zeros};
+use crate::sweep::{MeasuredPass, Zero, Zeros};
+use models::PeakToPeak;
 use models::pass::{REVERSED, is_reversed};
-use models::quantity::PeakToPeak;
 use serde::Serialize;
 
 /// The summary of a run with what is to be remarked of its passes, as summary.json and `run --json` have it.
@@ -99,8 +99,7 @@ const NO_REFERENCE: &str =
 #[cfg(test)]
 mod tests {
     use super::*;
-    use models::condition::Condition;
-    use models::pass::Pass;
+    use models::{Condition, Pass};
 
     fn pass(normal_force_n: f64, commanded_normal_force_n: Option<f64>) -> MeasuredPass {
         MeasuredPass {

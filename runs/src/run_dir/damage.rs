@@ -3,7 +3,7 @@
 use super::journal::changed;
 use super::lines::{whole_passes, whole_table};
 use super::{IDENTITY, JOURNAL, POINTS, SUMMARY, is_held, passes_in, records_in, sessions_in};
-use crate::sequence::MeasuredPass;
+use crate::sweep::MeasuredPass;
 use miette::{Context, IntoDiagnostic};
 use realtime::recorder::Integrity;
 use std::collections::BTreeSet;

@@ -2,8 +2,8 @@
 
 use super::lines::{whole_passes, whole_table};
 use super::{JOURNAL, POINTS};
-use crate::files::Placed;
-use crate::sequence::MeasuredPass;
+use crate::files::GuardedFile;
+use crate::sweep::MeasuredPass;
 use miette::{Context, IntoDiagnostic};
 use models::pass::{self, Pass};
 use std::collections::{BTreeMap, BTreeSet};
@@ -83,7 +83,7 @@ pub(super) fn changed(table: &[Pass], journal: &[MeasuredPass]) -> impl Iterator
 /// alone holds, or holds otherwise, is an error.
 pub(super) fn restore(
     path: &Path,
-    table: &mut Placed,
+    table: &mut GuardedFile,
     made: &mut Vec<Pass>,
     journal: Vec<MeasuredPass>,
 ) -> miette::Result<()> {

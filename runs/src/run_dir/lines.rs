@@ -1,7 +1,7 @@
 //! Files that grow line by line: what of them is whole after a crash or a power cut. An error is a line
 //! that is damaged, and not by a torn end.
 
-use crate::sequence::MeasuredPass;
+use crate::sweep::MeasuredPass;
 use miette::IntoDiagnostic;
 use models::pass::{self, Pass};
 

@@ -173,7 +173,7 @@ fn who_touches(file: &SetupFile, tip: &Fingertip, wrong: &mut Problems<'_>) {
 
 /// A virtual rig serves its instruments itself: an address that something else may have is none of its.
 fn real_addresses(file: &SetupFile, wrong: &mut Problems<'_>) {
-    use instruments::schema::LinkKind;
+    use instruments::LinkKind;
     for (table, instrument) in file.by_table() {
         let address = instrument.address.as_str();
         let Ok(profile) = instrument.description() else { continue };
@@ -202,7 +202,7 @@ fn real_addresses(file: &SetupFile, wrong: &mut Problems<'_>) {
 mod tests {
     use super::*;
     use crate::setup::Setup;
-    use drivers::library::Source;
+    use drivers::user_profiles::Source;
     use std::sync::Arc;
 
     /// A heartbeat whose time is long or not stated leaves the output on when this program dies.

@@ -3,8 +3,8 @@
 use super::{SetupFile, guards};
 use crate::input::{Problems, unit_meant};
 use drivers::InstrumentSetup;
-use models::quantity::PeakToPeak;
-use realtime::ports::Nanos;
+use models::PeakToPeak;
+use realtime::Nanos;
 use realtime::safety::{ChannelTiming, LimitError, Limits, Timing};
 use serde::{Deserialize, Serialize};
 

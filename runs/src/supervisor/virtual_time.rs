@@ -1,10 +1,10 @@
 //! The loop in virtual time: one turn a call, in the caller's thread, without a clock.
 
 use super::{Loop, NotOff, OffReport};
-use models::prediction::FrictionModel;
+use models::FrictionModel;
+use realtime::Nanos;
 use realtime::cycle::{Command, Config, CycleState};
-use realtime::ports::Nanos;
-use realtime::turn::{Ports, Row, Tick, turn};
+use realtime::cycle_io::{Ports, Row, Tick, run_cycle};
 use std::collections::VecDeque;
 use std::sync::Arc;
 
@@ -46,7 +46,7 @@ impl VirtualLoop {
         self.number += 1;
         let tick = Tick { number: self.number, lateness, now };
         let VirtualLoop { config, model, ports, state, queue, .. } = self;
-        let row = turn(config, &**model, state, ports, &mut || queue.pop_front(), tick);
+        let row = run_cycle(config, &**model, state, ports, &mut || queue.pop_front(), tick);
         self.last = Some(row);
         row
     }

@@ -1,10 +1,10 @@
 //! A verdict in the folder of its run: the page, the document, the corrected model and the next plan,
 //! under names that the catalogue knows.
 
-use diagnosis::document::document;
-use diagnosis::verdict::Diagnosis;
+use diagnosis::Diagnosis;
+use diagnosis::report::document::document;
 use miette::IntoDiagnostic;
-use models::rig_file::RigFile;
+use models::RigFile;
 use std::path::Path;
 
 /// The page for people.

@@ -6,7 +6,7 @@
 //! The recovery law binds the slip-back at touch-down too: without that a finite recovery would have no
 //! effect (physics of the paper's Fig. 13).
 
-use super::{Contact, Recovery};
+use super::{Contact, StretchRecovery};
 
 /// State of one lateral spring.
 #[derive(Clone, Copy, Debug, PartialEq, Default)]
@@ -17,14 +17,14 @@ pub struct Lateral {
     pub dwell_s: f64,
 }
 
-impl Recovery {
+impl StretchRecovery {
     /// A stretch (m) after `dt` seconds of free recovery towards zero.
     pub fn relax(&self, stretch_m: f64, dt: f64) -> f64 {
         match *self {
-            Recovery::Instant => 0.0,
-            Recovery::Rate(speed) => stretch_m.signum() * (stretch_m.abs() - speed * dt).max(0.0),
+            StretchRecovery::Instant => 0.0,
+            StretchRecovery::Rate(speed) => stretch_m.signum() * (stretch_m.abs() - speed * dt).max(0.0),
             // x' = -v tanh(x / knee) has a closed form: sinh(x / knee) decays exponentially.
-            Recovery::Soft { speed_m_s, knee_m } => {
+            StretchRecovery::Soft { speed_m_s, knee_m } => {
                 let ratio = stretch_m / knee_m;
                 let decay = speed_m_s * dt / knee_m;
                 if ratio.abs() > 30.0 {
@@ -63,7 +63,7 @@ impl Lateral {
     }
 
     /// Time out of contact: the stretch recovers, the dwell starts anew.
-    pub fn release(&mut self, recovery: Recovery, dt: f64) {
+    pub fn release(&mut self, recovery: StretchRecovery, dt: f64) {
         self.stretch_m = recovery.relax(self.stretch_m, dt);
         self.dwell_s = 0.0;
     }
@@ -75,7 +75,7 @@ mod tests {
 
     #[test]
     fn soft_recovery_is_a_rate_when_large_and_exponential_when_small() {
-        let law = Recovery::Soft { speed_m_s: 5e-3, knee_m: 1e-8 };
+        let law = StretchRecovery::Soft { speed_m_s: 5e-3, knee_m: 1e-8 };
         let large = law.relax(1e-6, 1e-5);
         assert!((large - (1e-6 - 5e-8)).abs() < 1e-12, "{large}");
         let small = law.relax(1e-10, 2e-6);
@@ -87,6 +87,6 @@ mod tests {
 
     #[test]
     fn a_rate_never_overshoots_zero() {
-        assert_eq!(Recovery::Rate(1.0).relax(-1e-6, 1.0), 0.0);
+        assert_eq!(StretchRecovery::Rate(1.0).relax(-1e-6, 1.0), 0.0);
     }
 }

@@ -160,11 +160,11 @@ fn cycle(contact: &Contact, preload_m: f64, start_m: f64) -> Pass {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::contact::Recovery;
+    use crate::contact::StretchRecovery;
 
     fn paper(v_r: f64) -> f64 {
         let mut contact = Contact::ideal(3.9e6, 1.5e6, 0.5, 0.5, 2.5e-6, 27_500.0, 0.02);
-        contact.recovery = Recovery::Rate(v_r);
+        contact.recovery = StretchRecovery::Rate(v_r);
         steady(&contact).lateral_force_n / (0.5 * 0.5)
     }
 

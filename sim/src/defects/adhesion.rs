@@ -13,7 +13,7 @@ pub(super) const KIND: DefectKind = DefectKind {
         contact.limit.adhesion_n = v[0] * (contact.speed_m_s / REFERENCE_M_S).powf(v[2]);
         contact.limit.adhesion_scale_n = v[1];
     }),
-    ..DefectKind::cause(Location::Contact, "attraction adds to the load that friction feels")
+    ..DefectKind::cause(DefectSite::Contact, "attraction adds to the load that friction feels")
 };
 
 const REFERENCE_M_S: f64 = 0.02;

@@ -4,5 +4,5 @@ use super::*;
 
 pub(super) const KIND: DefectKind = DefectKind {
     act: Act::Setup(|_, config| config.amplifier.refuses_off = true),
-    ..DefectKind::fault(Location::Plate, "the amplifier ignores its enable input once its output is on")
+    ..DefectKind::fault(DefectSite::Plate, "the amplifier ignores its enable input once its output is on")
 };

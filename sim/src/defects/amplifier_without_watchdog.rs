@@ -4,5 +4,5 @@ use super::*;
 
 pub(super) const KIND: DefectKind = DefectKind {
     act: Act::Setup(|_, config| config.amplifier.watchdog_s = 1e9),
-    ..DefectKind::fault(Location::Plate, "the amplifier's own watchdog does not act")
+    ..DefectKind::fault(DefectSite::Plate, "the amplifier's own watchdog does not act")
 };

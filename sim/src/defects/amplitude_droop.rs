@@ -16,5 +16,5 @@ pub(super) const KIND: DefectKind = DefectKind {
         let touched = 1.0 / (1.0 + v[1] * pp_m * 1e6 * (1.0 - area).max(0.0));
         pp_m / (1.0 + v[0] * area * touched)
     }),
-    ..DefectKind::cause(Location::Plate, "the plate's amplitude droops under the finger's load")
+    ..DefectKind::cause(DefectSite::Plate, "the plate's amplitude droops under the finger's load")
 };

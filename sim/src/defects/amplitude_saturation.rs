@@ -14,5 +14,5 @@ pub(super) const KIND: DefectKind = DefectKind {
         let open = (pp_m * inverse).recip().min(1.0);
         pp_m * std::f64::consts::FRAC_2_PI * (open.asin() + open * (1.0 - open * open).sqrt())
     }),
-    ..DefectKind::cause(Location::Plate, "the amplitude stops growing with the set-point")
+    ..DefectKind::cause(DefectSite::Plate, "the amplitude stops growing with the set-point")
 };

@@ -4,5 +4,5 @@ use super::*;
 
 pub(super) const KIND: DefectKind = DefectKind {
     act: Act::Setup(|_, config| config.room.chamber.stuck = true),
-    ..DefectKind::fault(Location::Instrument, "the chamber takes set-points and leaves the air as it is")
+    ..DefectKind::fault(DefectSite::Instrument, "the chamber takes set-points and leaves the air as it is")
 };

@@ -13,5 +13,5 @@ pub(super) const KIND: DefectKind = DefectKind {
         let bump = (-0.5 * ((at.position_m - v[1]) / v[2]).powi(2)).exp();
         contact.friction *= (1.0 + v[0] * bump).max(0.05);
     }),
-    ..DefectKind::cause(Location::Plate, "friction differs on a patch of the plate")
+    ..DefectKind::cause(DefectSite::Plate, "friction differs on a patch of the plate")
 };

@@ -14,5 +14,5 @@ pub(super) const KIND: DefectKind = DefectKind {
         forces.lateral_n = lateral_n + v[0] * normal_n;
         forces.normal_n = normal_n + v[1] * lateral_n;
     }),
-    ..DefectKind::cause(Location::Instrument, "a share of each force shows in the other channel")
+    ..DefectKind::cause(DefectSite::Instrument, "a share of each force shows in the other channel")
 };

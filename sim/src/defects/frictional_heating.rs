@@ -12,5 +12,5 @@ pub(super) const KIND: DefectKind = DefectKind {
         let mu0 = contact.friction;
         contact.friction = if q * mu0 < 1e-9 { mu0 } else { ((1.0 + 4.0 * q * mu0).sqrt() - 1.0) / (2.0 * q) };
     }),
-    ..DefectKind::cause(Location::Contact, "friction falls with the power that it dissipates")
+    ..DefectKind::cause(DefectSite::Contact, "friction falls with the power that it dissipates")
 };

@@ -11,5 +11,5 @@ pub(super) const KIND: DefectKind = DefectKind {
         // Seen along the sliding direction the phase turns by half a turn when the direction does.
         contact.motion.in_plane_phase_rad = v[1] + if at.direction < 0.0 { std::f64::consts::PI } else { 0.0 };
     }),
-    ..DefectKind::cause(Location::Plate, "the plate also vibrates along the sliding direction")
+    ..DefectKind::cause(DefectSite::Plate, "the plate also vibrates along the sliding direction")
 };

@@ -6,5 +6,5 @@ pub(super) const KIND: DefectKind = DefectKind {
     parameters: &[Parameter::factor("factor", 0.03, 0.5)],
     in_tables: false,
     act: Act::Forces(|v, _, forces| forces.lateral_n *= v[0]),
-    ..DefectKind::cause(Location::Instrument, "the gain of the lateral force is wrong")
+    ..DefectKind::cause(DefectSite::Instrument, "the gain of the lateral force is wrong")
 };

@@ -12,5 +12,5 @@ pub(super) const KIND: DefectKind = DefectKind {
         let settled = 1.0 - (-at.time_s / v[2]).exp();
         forces.lateral_n += v[0] * (v[1] + (1.0 - v[1]) * settled);
     }),
-    ..DefectKind::cause(Location::Instrument, "the zero of the lateral force is off and drifts")
+    ..DefectKind::cause(DefectSite::Instrument, "the zero of the lateral force is off and drifts")
 };

@@ -12,7 +12,7 @@ pub(super) const KIND: DefectKind = DefectKind {
         contact.lateral_stiffness_n_per_m *= (1.0 - v[0] * (response - 1.0) / 3.0).clamp(0.2, 4.0);
     }),
     ..DefectKind::cause(
-        Location::Finger,
+        DefectSite::Finger,
         "the lateral stiffness of the ridges depends on frequency as a resonance does",
     )
 };

@@ -10,7 +10,7 @@ pub(super) const KIND: DefectKind = DefectKind {
         contact.limit.area_share = v[0].min(1.0);
         contact.limit.area_reference_n = REFERENCE_N;
     }),
-    ..DefectKind::cause(Location::Contact, "part of the friction limit grows as the 2/3 power of the force")
+    ..DefectKind::cause(DefectSite::Contact, "part of the friction limit grows as the 2/3 power of the force")
 };
 
 /// Force at which the share leaves the friction as it was (N).

@@ -10,5 +10,5 @@ pub(super) const KIND: DefectKind = DefectKind {
         let pp = 2.0 * contact.sine_amplitude_m;
         contact.motion.modulation = (v[0] / (1.0 + pp / v[1])).min(0.95);
     }),
-    ..DefectKind::cause(Location::Plate, "the amplitude is modulated at twice the mains frequency")
+    ..DefectKind::cause(DefectSite::Plate, "the amplitude is modulated at twice the mains frequency")
 };

@@ -19,7 +19,7 @@ pub(super) const KIND: DefectKind = DefectKind {
         let edge = v[0] * v[3] * (-std::f64::consts::PI * (at.position_m + EDGE_M) / half_wave).exp();
         pp_m * (1.0 - v[0] + v[0] * phase.cos().abs() + edge)
     }),
-    ..DefectKind::cause(Location::Plate, "the amplitude depends on the position along the plate")
+    ..DefectKind::cause(DefectSite::Plate, "the amplitude depends on the position along the plate")
 };
 
 /// Distance of the driven edge from the middle of the stroke (m).

@@ -17,5 +17,5 @@ pub(super) const KIND: DefectKind = DefectKind {
         contact.normal_stiffness_n_per_m *= soft;
         contact.lateral_stiffness_n_per_m *= soft;
     }),
-    ..DefectKind::cause(Location::Contact, "friction and softness change with the time in contact")
+    ..DefectKind::cause(DefectSite::Contact, "friction and softness change with the time in contact")
 };

@@ -6,5 +6,5 @@ use super::*;
 pub(super) const KIND: DefectKind = DefectKind {
     parameters: &[Parameter::log("height_sd_m", 5e-9, 1.5e-6)],
     act: Act::Contact(|v, _, contact| contact.ridge.height_sd_m = v[0]),
-    ..DefectKind::cause(Location::Contact, "ridges of unequal height leave the plate one after another")
+    ..DefectKind::cause(DefectSite::Contact, "ridges of unequal height leave the plate one after another")
 };

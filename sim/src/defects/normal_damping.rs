@@ -11,5 +11,5 @@ pub(super) const KIND: DefectKind = DefectKind {
         contact.ridge.mass_kg = contact.ridge.mass_kg.max(1e-7);
         contact.ridge.damping_n_s_per_m += v[0] * contact.normal_stiffness_n_per_m;
     }),
-    ..DefectKind::cause(Location::Contact, "ridges are damped on their normal spring")
+    ..DefectKind::cause(DefectSite::Contact, "ridges are damped on their normal spring")
 };

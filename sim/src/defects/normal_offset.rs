@@ -8,5 +8,5 @@ pub(super) const KIND: DefectKind = DefectKind {
     act: Act::Forces(|v, at, forces| {
         forces.normal_n += v[0] * (1.0 - v[1] * (1.0 - (-at.time_s / 200.0).exp()));
     }),
-    ..DefectKind::cause(Location::Instrument, "the zero of the normal force is off")
+    ..DefectKind::cause(DefectSite::Instrument, "the zero of the normal force is off")
 };

@@ -16,7 +16,7 @@ pub(super) const KIND: DefectKind = DefectKind {
         forces.lateral_n = lateral_n * cos + normal_n * sin;
         forces.normal_n = normal_n * cos - lateral_n * sin;
     }),
-    ..DefectKind::cause(Location::Instrument, "the plate is tilted against the sensor")
+    ..DefectKind::cause(DefectSite::Instrument, "the plate is tilted against the sensor")
 };
 
 /// Length of the waves (m).

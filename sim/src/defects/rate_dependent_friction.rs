@@ -18,7 +18,7 @@ pub(super) const KIND: DefectKind = DefectKind {
         let factor = 1.0 + v[0] * (rise(contact.speed_m_s, wider.max(0.1)) - rise(REFERENCE_M_S, 1.0));
         contact.friction *= factor.clamp(0.2, 3.0);
     }),
-    ..DefectKind::cause(Location::Contact, "the coefficient of friction depends on the sliding speed")
+    ..DefectKind::cause(DefectSite::Contact, "the coefficient of friction depends on the sliding speed")
 };
 
 const REFERENCE_M_S: f64 = 0.02;

@@ -12,7 +12,7 @@ pub(super) const KIND: DefectKind = DefectKind {
         Parameter::linear("raised_k_per_n", 1.0, 5.0),
     ],
     act: Act::Plate(act),
-    ..DefectKind::cause(Location::Plate, "the plate is driven off its resonance as it warms")
+    ..DefectKind::cause(DefectSite::Plate, "the plate is driven off its resonance as it warms")
 };
 
 const QUALITY: f64 = 150.0;

@@ -18,5 +18,5 @@ pub(super) const KIND: DefectKind = DefectKind {
         contact.ridge.skin_ratio = 20.0;
         contact.ridge.skin_loss = v[2];
     }),
-    ..DefectKind::cause(Location::Contact, "ridges have mass: they overshoot, fly and land")
+    ..DefectKind::cause(DefectSite::Contact, "ridges have mass: they overshoot, fly and land")
 };

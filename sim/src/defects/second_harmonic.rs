@@ -11,5 +11,5 @@ pub(super) const KIND: DefectKind = DefectKind {
         contact.motion.second_harmonic = (v[0] * swing.min(2.0)).min(0.9);
         contact.motion.second_phase_rad = v[1];
     }),
-    ..DefectKind::cause(Location::Plate, "the plate also vibrates at twice the frequency")
+    ..DefectKind::cause(DefectSite::Plate, "the plate also vibrates at twice the frequency")
 };

@@ -6,5 +6,5 @@ pub(super) const KIND: DefectKind = DefectKind {
     parameters: &[Parameter::log("bandwidth_hz", 2.0, 80.0)],
     in_tables: false,
     act: Act::Setup(|v, config| config.sensor.bandwidth_hz = v[0]),
-    ..DefectKind::cause(Location::Instrument, "the bandwidth of the force sensor is lower than stated")
+    ..DefectKind::cause(DefectSite::Instrument, "the bandwidth of the force sensor is lower than stated")
 };

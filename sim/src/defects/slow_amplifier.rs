@@ -5,5 +5,5 @@ use super::*;
 pub(super) const KIND: DefectKind = DefectKind {
     parameters: &[Parameter::log("response_s", 1.5e-3, 6e-3)],
     act: Act::Setup(|v, config| config.amplifier.response_s = v[0]),
-    ..DefectKind::fault(Location::Plate, "the amplitude control of the amplifier follows its set-point slowly")
+    ..DefectKind::fault(DefectSite::Plate, "the amplitude control of the amplifier follows its set-point slowly")
 };

@@ -9,5 +9,5 @@ pub(super) const KIND: DefectKind = DefectKind {
         let speed = contact.speed_m_s;
         contact.speed_m_s = speed * (1.0 + (v[0] - 1.0) * (0.9 + 0.2 * speed / (speed + 0.05)));
     }),
-    ..DefectKind::cause(Location::Instrument, "the true sliding speed is not the one stated")
+    ..DefectKind::cause(DefectSite::Instrument, "the true sliding speed is not the one stated")
 };

@@ -14,5 +14,5 @@ pub(super) const KIND: DefectKind = DefectKind {
         let wave = phase.sin() + 0.2 * (3.0 * phase).sin();
         contact.speed_m_s *= (1.0 + v[0] * wave).max(0.02);
     }),
-    ..DefectKind::cause(Location::Instrument, "the speed rises and falls along the stroke")
+    ..DefectKind::cause(DefectSite::Instrument, "the speed rises and falls along the stroke")
 };

@@ -14,7 +14,7 @@ pub(super) const KIND: DefectKind = DefectKind {
         Parameter::log("asperity_load_n", 0.5, 3.0),
     ],
     act: Act::Contact(act),
-    ..DefectKind::cause(Location::Contact, "air trapped between ridges and plate carries part of the load")
+    ..DefectKind::cause(DefectSite::Contact, "air trapped between ridges and plate carries part of the load")
 };
 
 /// Mean free path of air at one atmosphere (m).

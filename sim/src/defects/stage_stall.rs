@@ -5,5 +5,5 @@ use super::*;
 pub(super) const KIND: DefectKind = DefectKind {
     parameters: &[Parameter::log("from_s", 0.5, 30.0)],
     act: Act::Setup(|v, config| config.stage.stalls_at_s = v[0]),
-    ..DefectKind::fault(Location::Instrument, "the stage's slide stands still from a time on")
+    ..DefectKind::fault(DefectSite::Instrument, "the stage's slide stands still from a time on")
 };

@@ -11,5 +11,5 @@ pub(super) const KIND: DefectKind = DefectKind {
         contact.normal_stiffness_n_per_m *= v[0].powf(v[1].cos());
         contact.lateral_stiffness_n_per_m *= v[0].powf(v[1].sin());
     }),
-    ..DefectKind::cause(Location::Finger, "the true stiffnesses are far from the nominal ones")
+    ..DefectKind::cause(DefectSite::Finger, "the true stiffnesses are far from the nominal ones")
 };

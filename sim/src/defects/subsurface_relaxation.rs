@@ -14,5 +14,5 @@ pub(super) const KIND: DefectKind = DefectKind {
         contact.normal_stiffness_n_per_m /= 1.0 + v[0] * crept;
         contact.lateral_stiffness_n_per_m /= 1.0 + v[2] * v[0] * crept;
     }),
-    ..DefectKind::cause(Location::Contact, "the tissue under the ridges creeps with the time in contact")
+    ..DefectKind::cause(DefectSite::Contact, "the tissue under the ridges creeps with the time in contact")
 };

@@ -9,5 +9,5 @@ pub(super) const KIND: DefectKind = DefectKind {
         config.sensor.latency_s += v[0];
         config.sensor.unstated_latency_s += v[0];
     }),
-    ..DefectKind::cause(Location::Instrument, "forces arrive later than stated")
+    ..DefectKind::cause(DefectSite::Instrument, "forces arrive later than stated")
 };

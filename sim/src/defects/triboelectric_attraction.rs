@@ -9,5 +9,5 @@ pub(super) const KIND: DefectKind = DefectKind {
         let shed = 1.0 / (1.0 + (2.0 * contact.sine_amplitude_m / 1e-6).powi(2));
         contact.normal_force_n += v[0] * shed * contact.speed_m_s / (contact.speed_m_s + v[1]);
     }),
-    ..DefectKind::cause(Location::Contact, "sliding charges the plate, and the charge attracts the finger")
+    ..DefectKind::cause(DefectSite::Contact, "sliding charges the plate, and the charge attracts the finger")
 };

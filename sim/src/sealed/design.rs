@@ -1,8 +1,7 @@
 //! Designs of sealed data sets: which passes were made. They differ as laboratories' sweeps do.
 
 use crate::noise::Noise;
-use models::condition::Condition;
-use models::quantity::{Direction, PeakToPeak};
+use models::{Condition, Direction, PeakToPeak};
 use serde::{Deserialize, Serialize};
 
 /// The plan of a set, in words that its label can hold.

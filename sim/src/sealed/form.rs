@@ -6,7 +6,7 @@
 //! and imitator are granted the same. What is compared is twice the expected negative log likelihood over the
 //! noise of the table, at noise-free forces, so no draw of the noise decides.
 
-use super::oracle::{Case, Fit};
+use super::oracle::{Case, ImitationFit};
 use crate::defects::Defects;
 use crate::world::Point;
 
@@ -127,7 +127,13 @@ pub(super) struct Departure {
 
 impl Case<'_> {
     /// Cost of a model of these forces (N), whose stiffnesses cost `prior`; `base` is the recalibrated baseline.
-    pub(super) fn departure(&self, kernel: &Kernel, model: &[f64], prior: f64, base: &Fit) -> Departure {
+    pub(super) fn departure(
+        &self,
+        kernel: &Kernel,
+        model: &[f64],
+        prior: f64,
+        base: &ImitationFit,
+    ) -> Departure {
         let own = Case { lateral_n: model, ..*self }.fit_from(&base.finger, &Defects::none(), 4);
         let change: Vec<f64> = own.residual_n.iter().zip(self.sd_n).map(|(d, sd)| d / sd).collect();
         let (cost, scale) = kernel.cost(&self.standardised(model), &change, prior);

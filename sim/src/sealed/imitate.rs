@@ -6,7 +6,7 @@
 //! that comes near.
 
 use super::form::{Kernel, solved};
-use super::oracle::{Case, Fit, NUISANCES, Theta, moved};
+use super::oracle::{Case, ImitationFit, NUISANCES, Theta, moved};
 use super::set_maker::NoiseFree;
 use crate::defects::{ALL, Defect, DefectKind, Defects, Draw, Parameter, Values, compatible};
 use crate::noise::Noise;
@@ -107,7 +107,13 @@ impl Case<'_> {
     /// cause that is itself all of `truth`, and those that act beside it or cannot. `base` is the
     /// recalibrated baseline, `truth_chi2` what the truth leaves. Expensive causes begin with a part unless
     /// `whole`.
-    pub fn imitators(&self, truth: &[Defect], base: &Fit, truth_chi2: f64, whole: bool) -> Vec<Imitator> {
+    pub fn imitators(
+        &self,
+        truth: &[Defect],
+        base: &ImitationFit,
+        truth_chi2: f64,
+        whole: bool,
+    ) -> Vec<Imitator> {
         let part = self.part(base);
         let thinned = Case { known: &part.known, lateral_n: &part.lateral_n, sd_n: &part.sd_n, ..*self };
         let thinned_base = thinned.fit_from(&base.finger, &Defects::none(), 4);
@@ -169,7 +175,7 @@ impl Case<'_> {
 
     /// A part of the passes that holds the gap in proportion: every so many of them in the order of what the
     /// baseline leaves, each counting for as many.
-    fn part(&self, base: &Fit) -> NoiseFree {
+    fn part(&self, base: &ImitationFit) -> NoiseFree {
         let mut order: Vec<usize> = (0..self.known.len()).collect();
         let size = |i: usize| (base.residual_n[i] / self.sd_n[i]).abs();
         order.sort_by(|a, b| size(*a).total_cmp(&size(*b)));
@@ -185,7 +191,7 @@ impl Case<'_> {
 
     /// The rungs of each draw's ladder that leave least, best first: chi2 with the nuisances refitted to
     /// first order, and the parameters.
-    fn ladder(&self, kind: Kind, base: &Fit) -> Vec<(f64, Values)> {
+    fn ladder(&self, kind: Kind, base: &ImitationFit) -> Vec<(f64, Values)> {
         let sides = if matches!(kind.parameters[0].draw, Draw::Log | Draw::Linear) { 1 } else { 2 };
         // Every side of the size with the first shape over its range.
         let (shapes, rungs) = match kind.parameters.len() > 1 {
@@ -219,7 +225,7 @@ impl Case<'_> {
     }
 
     /// A cause's best imitation from the two best draws of its ladder.
-    fn imitate(&self, kind: Kind, base: &Fit, truth_chi2: f64, near: f64, worth: f64) -> State {
+    fn imitate(&self, kind: Kind, base: &ImitationFit, truth_chi2: f64, near: f64, worth: f64) -> State {
         let mut best: Option<State> = None;
         let ladder = self.ladder(kind, base);
         let first = ladder[0].0;
@@ -241,7 +247,7 @@ impl Case<'_> {
     }
 
     /// Where a search starts: the baseline's nuisances, a cause's size and shapes.
-    fn state(&self, defect: &Defect, base: &Fit) -> State {
+    fn state(&self, defect: &Defect, base: &ImitationFit) -> State {
         let mut x = [0.0; UNKNOWNS];
         x[..NUISANCES].copy_from_slice(&self.logarithms(&base.finger));
         for (i, (p, value)) in defect.kind.parameters.iter().zip(defect.values).enumerate() {
@@ -301,7 +307,7 @@ impl Case<'_> {
 
     /// Cost of an imitation that may depart from its form, from the optimum without departures: where the
     /// departure takes up what is smooth, another size may do better.
-    fn form_cost(&self, kind: Kind, start: Unknowns, kernel: &Kernel, base: &Fit) -> f64 {
+    fn form_cost(&self, kind: Kind, start: Unknowns, kernel: &Kernel, base: &ImitationFit) -> f64 {
         let mut x = start;
         let mut model = self.run(kind, &x);
         let mut now = self.departure(kernel, &model, self.prior(theta(&x)), base);

@@ -35,7 +35,7 @@ pub struct Case<'a> {
 
 /// A fitted model: its chi2 (priors included), its fingertip, its residuals (N).
 #[derive(Clone)]
-pub struct Fit {
+pub struct ImitationFit {
     /// Sum of squares in standard deviations, priors included.
     pub chi2: f64,
     /// The refitted fingertip.
@@ -96,12 +96,12 @@ impl Case<'_> {
     }
 
     /// The best a model can do with the nuisances refitted from the nominal fingertip.
-    pub fn fit(&self, defects: &Defects, iterations: usize) -> Fit {
+    pub fn fit(&self, defects: &Defects, iterations: usize) -> ImitationFit {
         self.fit_from(&self.nominal, defects, iterations)
     }
 
     /// The same from another start.
-    pub fn fit_from(&self, start: &Finger, defects: &Defects, iterations: usize) -> Fit {
+    pub fn fit_from(&self, start: &Finger, defects: &Defects, iterations: usize) -> ImitationFit {
         let mut theta = self.logarithms(start);
         let mut model = self.predict(&moved(&self.nominal, theta), defects);
         let mut chi2 = self.chi2(&model, theta);
@@ -129,7 +129,7 @@ impl Case<'_> {
             }
         }
         let residual_n = self.lateral_n.iter().zip(&model).map(|(y, m)| y - m).collect();
-        Fit { chi2, finger: moved(&self.nominal, theta), residual_n }
+        ImitationFit { chi2, finger: moved(&self.nominal, theta), residual_n }
     }
 
     pub(super) fn jacobian(&self, theta: Theta, defects: &Defects, model: &[f64]) -> Jacobian {

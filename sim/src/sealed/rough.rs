@@ -5,7 +5,7 @@ use super::design::{Design, Planned};
 use super::set_maker::SetMaker;
 use crate::defects::{DefectKind, Defects};
 use crate::noise::Noise;
-use models::pass::Pass;
+use models::Pass;
 use serde::{Deserialize, Serialize};
 
 /// How the scatter of a set departs from normal, independent scatter of the stated size.

@@ -6,9 +6,7 @@ use crate::defects::{Defect, DefectKind, Defects, Surroundings};
 use crate::finger::{Finger, FingerConfig};
 use crate::noise::Noise;
 use crate::world::{Point, steady_forces};
-use models::pass::Pass;
-use models::quantity::PeakToPeak;
-use models::rig_file::{Calibration, PassNoise, RigFile};
+use models::{Calibration, Pass, PassNoise, PeakToPeak, RigFile};
 use serde::{Deserialize, Serialize};
 
 /// The noise of a set's forces.

@@ -1,10 +1,9 @@
 //! One emulated instrument: registers out of the world, commands into it.
 
 use super::{Command, Plant, Quantity};
-use instruments::profile::FrameKind;
 use instruments::schema::Table;
-use instruments::{FrameId, Profile, SetId, SignalId, Values};
-use realtime::ports::Nanos;
+use instruments::{FrameId, FrameKind, Profile, SetId, SignalId, Values};
+use realtime::Nanos;
 
 /// Where a signal's value comes from.
 #[derive(Debug, Clone, Copy)]

@@ -6,11 +6,9 @@
 
 use super::device::Device;
 use super::{Command, Plant};
-use instruments::codec::can::CanFrame;
 use instruments::codec::canopen::{self, DriveState, SdoAnswer, SdoRequest};
-use instruments::profile::FrameKind;
-use instruments::{FrameId, SetId};
-use realtime::ports::Nanos;
+use instruments::{CanFrame, FrameId, FrameKind, SetId};
+use realtime::Nanos;
 use std::collections::HashMap;
 
 /// Time between two heartbeats.

@@ -2,9 +2,9 @@
 
 use super::device::{Device, Refused};
 use super::{Service, SharedPlant};
-use instruments::codec::modbus_rtu::{self as rtu, Heard, Operation};
+use instruments::codec::modbus_rtu::{self as rtu, Operation, Parsed};
 use instruments::schema::{Stream, Table};
-use realtime::ports::Nanos;
+use realtime::Nanos;
 use std::collections::{BTreeMap, BTreeSet};
 use std::io;
 use std::time::Duration;
@@ -111,11 +111,11 @@ impl RtuLine {
         let own: Vec<u8> = self.devices.values().flat_map(functions).map(|(function, _)| function).collect();
         loop {
             match rtu::hear(&self.heard, &own) {
-                Heard::Incomplete => return Vec::new(),
-                Heard::Noise => {
+                Parsed::Incomplete => return Vec::new(),
+                Parsed::Noise => {
                     self.heard.remove(0);
                 }
-                Heard::Request(unit, operation, length) => {
+                Parsed::Request(unit, operation, length) => {
                     self.heard.drain(..length);
                     return self.answer(unit, operation);
                 }

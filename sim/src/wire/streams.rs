@@ -3,7 +3,7 @@
 use super::device::Device;
 use super::serial::frames;
 use super::{Service, SharedPlant};
-use instruments::schema::LinkKind;
+use instruments::LinkKind;
 use std::io::{self, Write};
 use std::net::{SocketAddr, TcpListener, TcpStream, UdpSocket};
 use std::time::Duration;

@@ -2,8 +2,7 @@
 
 use super::device::Device;
 use super::{Service, SharedPlant};
-use instruments::FrameId;
-use instruments::profile::FrameKind;
+use instruments::{FrameId, FrameKind};
 use std::io;
 use std::path::{Path, PathBuf};
 use std::sync::atomic::{AtomicU32, Ordering};

@@ -6,7 +6,7 @@ use crate::defects::Forces;
 use crate::room::Air;
 use crate::stage::StageInput;
 use crate::world::World;
-use models::quantity::PeakToPeak;
+use models::PeakToPeak;
 use realtime::ports::{Nanos, StageState};
 use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
 

@@ -9,8 +9,7 @@ use crate::contact::{Contact, Steady};
 use crate::defects::Surroundings;
 use crate::finger::Finger;
 use crate::world::{Point, steady_contact};
-use models::quantity::PeakToPeak;
-use models::surrogate::Surrogate;
+use models::{PeakToPeak, Surrogate};
 
 /// The ridge under the finger.
 pub(super) struct RidgeTable {

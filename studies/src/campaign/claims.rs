@@ -4,12 +4,12 @@
 //! rises), within the margin (it does not matter), or across it (undecided). A statement is supported or
 //! contradicted by that, never by a difference that is merely not significant.
 
-use super::measured::{Driven, Effect, Measured, contrast, mean};
+use super::measured::{Driven, Measured, MeasuredChange, contrast, mean};
+use models::Surrogate;
 use models::covariate::{self, Covariate};
 use models::prediction::{EmpiricalPsi, FrictionModel, SpringSlider, Validity};
-use models::surrogate::Surrogate;
 use runs::fingertip::FingertipKind;
-use runs::human::number;
+use runs::format::number;
 use runs::report::plots::ends;
 use serde::Serialize;
 use std::collections::BTreeMap;
@@ -29,7 +29,7 @@ pub enum Trend {
 /// What the campaign says of a statement.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize)]
 #[serde(rename_all = "snake_case")]
-pub enum Answer {
+pub enum ClaimAnswer {
     /// The interval lies where the statement says.
     Supported,
     /// It lies elsewhere.
@@ -50,13 +50,13 @@ pub struct Claim {
     /// What it expects.
     pub expected: Trend,
     /// The change of mu', with its interval; `None` where nothing varies what it is about.
-    pub effect: Option<Effect>,
+    pub effect: Option<MeasuredChange>,
     /// What the change is of, in words.
     pub of: String,
     /// Change of mu' that does not matter.
     pub margin: f64,
     /// The answer.
-    pub answer: Answer,
+    pub answer: ClaimAnswer,
     /// Least change that would have been decided: the margin and half of the interval. `None` without an
     /// effect.
     pub visible: Option<f64>,
@@ -74,12 +74,14 @@ impl Claim {
     /// The answer in a word, and whether there is a change that the margin covers.
     pub fn words(&self) -> String {
         let word = match self.answer {
-            Answer::Supported => "supported",
-            Answer::Contradicted => "contradicted",
-            Answer::Undecided => "undecided",
+            ClaimAnswer::Supported => "supported",
+            ClaimAnswer::Contradicted => "contradicted",
+            ClaimAnswer::Undecided => "undecided",
         };
-        let covered = |e: Effect| {
-            self.answer != Answer::Undecided && e.ci95[0] * e.ci95[1] > 0.0 && e.change.abs() < self.margin
+        let covered = |e: MeasuredChange| {
+            self.answer != ClaimAnswer::Undecided
+                && e.ci95[0] * e.ci95[1] > 0.0
+                && e.change.abs() < self.margin
         };
         let more = if self.effect.is_some_and(covered) { ", with a change within the margin" } else { "" };
         format!("{word}{more}")
@@ -125,9 +127,9 @@ pub fn claims(sessions: &[Measured], margin: f64) -> Vec<Claim> {
             Err(why) => (None, why),
         };
         let answer = match effect.and_then(|e| trend(e.ci95, margin)) {
-            None => Answer::Undecided,
-            Some(found) if found == expected => Answer::Supported,
-            Some(_) => Answer::Contradicted,
+            None => ClaimAnswer::Undecided,
+            Some(found) if found == expected => ClaimAnswer::Supported,
+            Some(_) => ClaimAnswer::Contradicted,
         };
         let visible = effect.map(|e| margin + 0.5 * (e.ci95[1] - e.ci95[0]));
         Claim { name, statement, source, expected, effect, of, margin, answer, visible }
@@ -136,7 +138,11 @@ pub fn claims(sessions: &[Measured], margin: f64) -> Vec<Claim> {
 }
 
 /// The effect of a factor that is varied within sessions.
-fn within(sessions: &[Measured], factor: &Covariate, intermittent: bool) -> Result<(Effect, String), String> {
+fn within(
+    sessions: &[Measured],
+    factor: &Covariate,
+    intermittent: bool,
+) -> Result<(MeasuredChange, String), String> {
     let of_session = |s: &Measured| {
         let driven: Vec<_> = s.driven.iter().filter(|d| d.intermittent || !intermittent).copied().collect();
         contrast(factor, &driven)
@@ -146,7 +152,7 @@ fn within(sessions: &[Measured], factor: &Covariate, intermittent: bool) -> Resu
         return Err(format!("no complete session varies the {}", factor.words));
     }
     let changes: Vec<f64> = found.iter().map(|(change, _)| *change).collect();
-    let effect = Effect::mean_of(&changes, 0.0).ok_or_else(|| ONE.to_string())?;
+    let effect = MeasuredChange::mean_of(&changes, 0.0).ok_or_else(|| ONE.to_string())?;
     let (scale, unit) = factor.shown;
     let end = |i: usize| number(scale * mean(found.iter().map(|(_, e)| e[i])).unwrap_or(f64::NAN));
     Ok((effect, format!("{} {} to {} {unit}", factor.words, end(0), end(1))))
@@ -160,7 +166,7 @@ fn across(
     words: &str,
     x: impl Fn(&Measured) -> Option<f64>,
     other: impl Fn(&Measured) -> Option<f64>,
-) -> Result<(Effect, String), String> {
+) -> Result<(MeasuredChange, String), String> {
     let row = |s: &Measured| Some([s.mean_mu()?, x(s)?.ln(), other(s).map_or(f64::NAN, f64::ln)]);
     let (rows, least) = by_cell(sessions, row);
     let column = |i: usize| rows.iter().map(|row| row[i]).collect::<Vec<f64>>();
@@ -172,7 +178,7 @@ fn across(
     }
     let varies = ends(&other);
     let other = (varies[1] - varies[0] > LEAST_FACTOR.ln()).then_some(other.as_slice());
-    let effect = Effect::slope(&x, &y, other, least)
+    let effect = MeasuredChange::slope(&x, &y, other, least)
         .ok_or_else(|| format!("too few cells, or {words} changes with something else"))?;
     Ok((effect, format!("{words} over a factor of {}", number(factor))))
 }
@@ -185,7 +191,7 @@ fn beside<M: FrictionModel>(
     sessions: &[Measured],
     words: &str,
     model: impl Fn(&Measured) -> Option<M>,
-) -> Result<(Effect, String), String> {
+) -> Result<(MeasuredChange, String), String> {
     let mut shared = 0.0f64;
     let mut of_session = |s: &Measured| {
         let model = model(s)?;
@@ -199,7 +205,7 @@ fn beside<M: FrictionModel>(
     if departures.is_empty() {
         return Err(format!("most passes lie beyond the range of {words}"));
     }
-    let effect = Effect::mean_of(&departures, shared).ok_or_else(|| ONE.to_string())?;
+    let effect = MeasuredChange::mean_of(&departures, shared).ok_or_else(|| ONE.to_string())?;
     Ok((effect, format!("measured less predicted by {words}")))
 }
 
@@ -225,7 +231,7 @@ fn by_cell<const N: usize>(
 }
 
 /// How far human and artificial tips lie apart beside one law.
-fn kinds(sessions: &[Measured]) -> Result<(Effect, String), String> {
+fn kinds(sessions: &[Measured]) -> Result<(MeasuredChange, String), String> {
     let of = |human: bool| {
         let departure = |s: &Measured| {
             let own = s.kind != FingertipKind::Probe && (s.kind == FingertipKind::Human) == human;
@@ -235,7 +241,7 @@ fn kinds(sessions: &[Measured]) -> Result<(Effect, String), String> {
         };
         by_cell(sessions, departure)
     };
-    let effect = Effect::between(of(true), of(false))
+    let effect = MeasuredChange::between(of(true), of(false))
         .ok_or_else(|| "two cells or more of each kind of tip are needed".to_string())?;
     Ok((effect, "human less artificial, beside Eq. 20".to_string()))
 }

@@ -4,17 +4,15 @@
 //! computed in each session by itself, as a difference between the ends of a factor's range at otherwise
 //! equal settings, and its interval is Student's over sessions; of what differs between cells, over cells.
 
-use models::condition::Condition;
 use models::covariate::{self, Covariate};
-use models::finger::Finger;
 use models::pass::coulomb_coefficient;
 use models::prediction::Regime;
-use models::quantity::PeakToPeak;
+use models::{Condition, Finger, PeakToPeak};
+use runs::MeasuredPass;
 use runs::campaign::CampaignRun;
 use runs::fingertip::FingertipKind;
 use runs::report::levels::Levels;
 use runs::report::plots::ends;
-use runs::sequence::MeasuredPass;
 use statrs::distribution::{ContinuousCDF, StudentsT};
 use std::collections::BTreeMap;
 
@@ -90,7 +88,7 @@ fn mean_and_variance(values: &[f64]) -> Option<(f64, f64, f64)> {
 
 /// A change of relative friction with its 95 % interval.
 #[derive(Clone, Copy, Debug, PartialEq, serde::Serialize)]
-pub struct Effect {
+pub struct MeasuredChange {
     /// Change of mu'.
     pub change: f64,
     /// Its 95 % interval.
@@ -99,19 +97,19 @@ pub struct Effect {
     pub sessions: usize,
 }
 
-impl Effect {
+impl MeasuredChange {
     /// A value with its standard error on so many degrees of freedom, and a standard uncertainty that all
     /// sessions share.
     pub fn new(change: f64, error: f64, freedom: f64, shared: f64, sessions: usize) -> Option<Self> {
         let t = StudentsT::new(0.0, 1.0, freedom).ok()?.inverse_cdf(0.975);
         let half = (t * error).hypot(1.96 * shared);
-        Some(Effect { change, ci95: [change - half, change + half], sessions })
+        Some(MeasuredChange { change, ci95: [change - half, change + half], sessions })
     }
 
     /// The mean of one value a session; `None` with fewer than two.
     pub fn mean_of(values: &[f64], shared: f64) -> Option<Self> {
         let (m, variance, n) = mean_and_variance(values)?;
-        Effect::new(m, variance.sqrt(), n - 1.0, shared, values.len())
+        MeasuredChange::new(m, variance.sqrt(), n - 1.0, shared, values.len())
     }
 
     /// Difference of the means of two groups of cells, Welch's; beside each its cells' least variance.
@@ -121,7 +119,7 @@ impl Effect {
         let (va, vb) = (va.max(least_a / na), vb.max(least_b / nb));
         let freedom =
             (va + vb).powi(2) / (va * va / (na - 1.0) + vb * vb / (nb - 1.0)).max(f64::MIN_POSITIVE);
-        Effect::new(ma - mb, (va + vb).sqrt(), freedom.clamp(1.0, 1e6), 0.0, a.len() + b.len())
+        MeasuredChange::new(ma - mb, (va + vb).sqrt(), freedom.clamp(1.0, 1e6), 0.0, a.len() + b.len())
     }
 
     /// Change over the range of `x` by a straight line through one point a cell, others of its covariates
@@ -144,7 +142,7 @@ impl Effect {
         let left = x0.iter().zip(&y0).map(|(x, y)| (y - slope * x).powi(2)).sum::<f64>();
         let [low, high] = ends(x);
         let range = high - low;
-        Effect::new(slope * range, range * ((left / freedom).max(least) / xx).sqrt(), freedom, 0.0, n)
+        MeasuredChange::new(slope * range, range * ((left / freedom).max(least) / xx).sqrt(), freedom, 0.0, n)
     }
 }
 

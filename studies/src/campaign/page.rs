@@ -2,13 +2,10 @@
 
 use super::claims::{Claim, Trend, claims};
 use super::measured::{Driven, FACTORS, Measured, groups, mean};
-use models::condition::Condition;
-use models::covariate::Covariate;
-use models::prediction::{FrictionModel, SpringSlider};
 use models::psi::PsiEq17;
-use models::surrogate::Surrogate;
+use models::{Condition, Covariate, FrictionModel, SpringSlider, Surrogate};
 use runs::campaign::{CampaignFile, sessions};
-use runs::human::number;
+use runs::format::number;
 use runs::report::html::{escape, head, list, note, shell, table};
 use runs::report::plots::campaign::{Series, against, against_psi};
 use runs::report::plots::{ends, mark_name};

@@ -19,18 +19,18 @@ pub struct Engine {
     /// Name.
     pub name: &'static str,
     /// Hands the tasks over.
-    pub submit: fn(&Path, &Job) -> miette::Result<Handed>,
+    pub submit: fn(&Path, &ClusterJob) -> miette::Result<Accepted>,
     /// Takes up a job that an earlier command handed over.
-    pub again: fn(&Path, &Job) -> miette::Result<Handed>,
+    pub again: fn(&Path, &ClusterJob) -> miette::Result<Accepted>,
     /// Whether tasks may still be run; hands over more where not all are.
-    pub alive: fn(&Path, &Job, &mut Handed) -> miette::Result<bool>,
+    pub alive: fn(&Path, &ClusterJob, &mut Accepted) -> miette::Result<bool>,
     /// Ends what runs and what waits.
-    pub cancel: fn(&Job) -> miette::Result<()>,
+    pub cancel: fn(&ClusterJob) -> miette::Result<()>,
 }
 
 /// `job.json` in a job's folder: what was handed over, to whom, and how.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
-pub struct Job {
+pub struct ClusterJob {
     /// Name of the engine.
     pub engine: String,
     /// The engine's own names of the job.
@@ -62,7 +62,7 @@ pub struct Job {
 }
 
 /// What an engine has accepted.
-pub struct Handed {
+pub struct Accepted {
     /// Its names.
     pub ids: Vec<String>,
     /// The process that stands between, where there is one.
@@ -81,19 +81,19 @@ fn one() -> u64 {
     1
 }
 
-impl Handed {
+impl Accepted {
     /// What `job.json` states.
-    pub fn of(job: &Job) -> Handed {
-        Handed { ids: job.ids.clone(), child: None, tasks: 0, array: 1, refusals: 0, pause_until: None }
+    pub fn of(job: &ClusterJob) -> Accepted {
+        Accepted { ids: job.ids.clone(), child: None, tasks: 0, array: 1, refusals: 0, pause_until: None }
     }
 }
 
-impl Job {
+impl ClusterJob {
     /// Reads `job.json`.
     ///
     /// # Errors
     /// A folder without one, one of another version, or one that another user wrote.
-    pub fn read(folder: &Path) -> miette::Result<Job> {
+    pub fn read(folder: &Path) -> miette::Result<ClusterJob> {
         let path = folder.join("job.json");
         let shown = || path.display().to_string();
         let file = runs::files::open_plain(&path, std::fs::OpenOptions::new().read(true));

@@ -49,7 +49,7 @@ fn peak_bytes() -> Option<u64> {
 
 /// Ranges for an engine.
 #[derive(Clone, Debug, PartialEq, Serialize)]
-pub struct Plan {
+pub struct TaskPlan {
     /// One a task.
     pub ranges: Vec<Range<u64>>,
     /// Cases of a task.
@@ -112,7 +112,7 @@ fn nth(holes: &[Range<u64>], mut n: u64) -> u64 {
 }
 
 /// Cuts what is missing into tasks of about `task_s` seconds; none is over a third of `limit_s` where that is given.
-pub fn cut(holes: &[Range<u64>], pilot: &Pilot, workers: u64, task_s: f64, limit_s: Option<f64>) -> Plan {
+pub fn cut(holes: &[Range<u64>], pilot: &Pilot, workers: u64, task_s: f64, limit_s: Option<f64>) -> TaskPlan {
     let missing = length(holes);
     let wanted = limit_s.map_or(task_s, |limit| task_s.min(limit / 3.0));
     let by_time = (wanted / pilot.mean_s.max(1e-6)) as u64;
@@ -121,7 +121,7 @@ pub fn cut(holes: &[Range<u64>], pilot: &Pilot, workers: u64, task_s: f64, limit
     let ranges = holes.iter().flat_map(|hole| pieces(hole, cases_a_task)).collect();
     let expected = cases_a_task as f64 * pilot.mean_s;
     let limit_s = limit_s.unwrap_or(60.0 + 3.0 * expected + 5.0 * pilot.longest_s);
-    Plan { ranges, cases_a_task, task_s: expected, limit_s }
+    TaskPlan { ranges, cases_a_task, task_s: expected, limit_s }
 }
 
 #[cfg(test)]

@@ -2,10 +2,10 @@
 //! job that is still at work is followed, and only what is missing then is handed over.
 #![allow(clippy::disallowed_methods, reason = "somebody waits in wall-clock time")]
 
-use super::engines::{self, Engine, Handed, Job};
+use super::engines::{self, Accepted, ClusterJob, Engine};
 use super::file::{self, Header};
 use super::gather::{gather, holes};
-use super::plan::{self, Pilot, Plan, length};
+use super::plan::{self, Pilot, TaskPlan, length};
 use super::run::Entry;
 use super::shard::Reader;
 use super::study::Study;
@@ -168,7 +168,7 @@ pub fn submit(study: &Study, options: &Options) -> miette::Result<Submitted> {
             Some(engine) => {
                 // The folder says which job it is; programs and their options come from the command line.
                 let (server, python) = (options.server.clone(), options.python.clone());
-                let job = Job { server, python, command: Vec::new(), options: Vec::new(), ..job };
+                let job = ClusterJob { server, python, command: Vec::new(), options: Vec::new(), ..job };
                 let Ok(handed) = (engine.again)(&folder, &job) else { continue };
                 follow(study, engine, &folder, &job, handed, &bar)?;
             }
@@ -289,7 +289,7 @@ fn pilot(study: &Study, holes: &[Range<u64>], options: &Options) -> miette::Resu
 }
 
 /// The ranges of what is missing.
-fn cut(holes: &[Range<u64>], pilot: &Pilot, options: &Options) -> Plan {
+fn cut(holes: &[Range<u64>], pilot: &Pilot, options: &Options) -> TaskPlan {
     plan::cut(holes, pilot, options.workers.unwrap_or_else(cores), options.task_s, options.limit_s)
 }
 
@@ -330,7 +330,7 @@ fn command(study: &Study) -> miette::Result<Vec<String>> {
 
 /// Runs a plan on this machine: the same worker, on the threads of a pool. A case that cannot be made leaves
 /// its range undone and the others not; a disk that is full ends it.
-fn here(study: &Study, plan: &Plan, threads: u64, bar: &ProgressBar) -> miette::Result<()> {
+fn here(study: &Study, plan: &TaskPlan, threads: u64, bar: &ProgressBar) -> miette::Result<()> {
     let pool = rayon::ThreadPoolBuilder::new().num_threads(threads as usize).build().into_diagnostic()?;
     let program = runs::version::program_sha256().into_diagnostic()?;
     let first = Mutex::new(None);
@@ -355,14 +355,14 @@ fn here(study: &Study, plan: &Plan, threads: u64, bar: &ProgressBar) -> miette::
 fn hand_over(
     study: &Study,
     engine: &Engine,
-    plan: &Plan,
+    plan: &TaskPlan,
     memory_bytes: Option<u64>,
     options: &Options,
-) -> miette::Result<(PathBuf, Job, Handed)> {
+) -> miette::Result<(PathBuf, ClusterJob, Accepted)> {
     let folder = new_folder(&study.out.join("jobs"))?;
     let mut command = command(study)?;
     command.extend(["--job".into(), folder.display().to_string()]);
-    let mut job = Job {
+    let mut job = ClusterJob {
         engine: engine.name.into(),
         ids: Vec::new(),
         kind: study.kind.name.into(),
@@ -383,7 +383,7 @@ fn hand_over(
         Ok(handed) => handed,
         Err(why) => {
             // Arrays that were accepted before the refusal go on: the next call follows them.
-            if Job::read(&folder).is_ok_and(|job| job.ids.is_empty()) {
+            if ClusterJob::read(&folder).is_ok_and(|job| job.ids.is_empty()) {
                 runs::files::write_plain(&folder.join("ended"), "")?;
             }
             return Err(why);
@@ -420,8 +420,8 @@ fn follow(
     study: &Study,
     engine: &Engine,
     folder: &Path,
-    job: &Job,
-    mut handed: Handed,
+    job: &ClusterJob,
+    mut handed: Accepted,
     bar: &ProgressBar,
 ) -> miette::Result<Vec<String>> {
     let (cases, begun, mut last_query) = (study.file.header.cases, Instant::now(), Instant::now());
@@ -448,9 +448,13 @@ fn follow(
 }
 
 /// Jobs that nobody has seen the end of.
-fn at_work(out: &Path) -> miette::Result<Vec<(PathBuf, Job)>> {
+fn at_work(out: &Path) -> miette::Result<Vec<(PathBuf, ClusterJob)>> {
     let open = |f: &PathBuf| !f.join("ended").exists() && !f.join("cancelled").exists();
-    engines::folders(out)?.into_iter().filter(open).map(|f| Job::read(&f).map(|job| (f, job))).collect()
+    engines::folders(out)?
+        .into_iter()
+        .filter(open)
+        .map(|f| ClusterJob::read(&f).map(|job| (f, job)))
+        .collect()
 }
 
 /// Cancels the jobs of a folder that have not ended. Returns the engine's names of them.

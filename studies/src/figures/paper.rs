@@ -3,7 +3,7 @@
 //! as by colour. As SVG, and as PDF; both are drawn by the same strokes.
 
 use super::pdf::PdfBackend;
-use super::plot::{Chart, Series, Stated};
+use super::plot::{Chart, PaperMark, Series};
 use miette::miette;
 use plotters::coord::Shift;
 use plotters::prelude::*;
@@ -92,8 +92,8 @@ fn range(chart: &Chart, y: bool) -> std::ops::Range<f64> {
     let drawn = chart.series.iter().flat_map(|s| s.points.iter().map(of));
     let bands = chart.series.iter().flat_map(|s| s.band.iter().flat_map(|b| [b.1, b.2])).filter(|_| y);
     let stated = chart.stated.iter().flat_map(|s| match s {
-        Stated::Span(range, _) if !y => range.to_vec(),
-        Stated::Level(value, _) if y => vec![*value],
+        PaperMark::Span(range, _) if !y => range.to_vec(),
+        PaperMark::Level(value, _) if y => vec![*value],
         _ => Vec::new(),
     });
     let all = drawn.chain(bands).chain(stated).filter(|v| v.is_finite());
@@ -123,11 +123,11 @@ where
     for stated in &chart.stated {
         let (x, y) = (range(chart, false), range(chart, true));
         match stated {
-            Stated::Span([low, high], _) => {
+            PaperMark::Span([low, high], _) => {
                 let corners = [(*low, y.start), (*high, y.end)];
                 axes.draw_series([Rectangle::new(corners, GREY.mix(0.2).filled())])?;
             }
-            Stated::Level(value, _) => {
+            PaperMark::Level(value, _) => {
                 let ends = [(x.start, *value), (x.end, *value)];
                 axes.draw_series(DashedLineSeries::new(ends, 12, 24, GREY.stroke_width(8)))?;
             }
@@ -251,12 +251,12 @@ where
     }
     for (n, stated) in (chart.series.len()..).zip(&chart.stated) {
         let (x, y) = place(n);
-        let (Stated::Span(_, text) | Stated::Level(_, text)) = stated;
+        let (PaperMark::Span(_, text) | PaperMark::Level(_, text)) = stated;
         match stated {
-            Stated::Span(..) => {
+            PaperMark::Span(..) => {
                 area.draw(&Rectangle::new([(x, y - 30), (x + 160, y + 30)], GREY.mix(0.2).filled()))?
             }
-            Stated::Level(..) => {
+            PaperMark::Level(..) => {
                 for from in (x..x + 160).step_by(36) {
                     area.draw(&PathElement::new(vec![(from, y), (from + 12, y)], GREY.stroke_width(8)))?;
                 }

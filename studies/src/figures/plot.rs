@@ -20,7 +20,7 @@ pub struct Series {
 }
 
 /// What the paper states of a figure without a curve for it.
-pub enum Stated {
+pub enum PaperMark {
     /// Something happens between two values of x: which, and what the paper says.
     Span([f64; 2], &'static str),
     /// A value of y, and what the paper says.
@@ -52,7 +52,7 @@ pub struct Chart {
     /// Curves.
     pub series: Vec<Series>,
     /// What the paper states.
-    pub stated: Vec<Stated>,
+    pub stated: Vec<PaperMark>,
 }
 
 impl Chart {

@@ -4,9 +4,8 @@ use super::Reproduced;
 use super::plot::{Chart, Series};
 use super::reading::{self, Reading};
 use miette::IntoDiagnostic;
-use models::condition::Condition;
-use models::finger::Finger;
 use models::spring_slider::{self, Cycle};
+use models::{Condition, Finger};
 
 fn condition(reading: Reading, w_m: f64, normal_force_n: f64) -> Condition {
     Condition { amplitude: reading.motion(w_m), normal_force_n, ..Condition::paper() }

@@ -7,13 +7,11 @@ pub mod distance;
 pub mod reliability;
 pub mod rough;
 
-use diagnosis::Verdict;
 use diagnosis::constants::Constants;
 use diagnosis::data::{RigFile, Table};
-use diagnosis::hypotheses::Options;
-use diagnosis::verdict::diagnose;
+use diagnosis::{Options, Verdict, diagnose};
 use miette::IntoDiagnostic;
-use models::condition::Condition;
+use models::Condition;
 use models::covariate;
 use reliability::{Entry, identifiable};
 use serde::{Deserialize, Serialize};

@@ -1,14 +1,14 @@
 //! `muprime calibrate amplitude`.
 
-use super::{Bench, LiveTable, Of, Outcome, Sources, columns, displacement};
+use super::{Bench, CalibrationResult, LiveTable, Of, Sources, columns, displacement};
 use calibration::amplitude::apply::AmplitudeFit;
 use calibration::amplitude::droop::{Exponent, droop};
-use calibration::amplitude::gain::{Form, fit};
+use calibration::amplitude::gain::{GainForm, fit};
 use calibration::amplitude::map::mode_shape;
 use calibration::amplitude::resonance::sweep;
 use calibration::amplitude::{AmplitudeError, AmplitudePoint};
+use runs::Setup;
 use runs::say;
-use runs::setup::Setup;
 use std::path::{Path, PathBuf};
 
 /// Arguments.
@@ -77,7 +77,11 @@ enum FormChoice {
 }
 
 /// Calibrates; a table that is taken live goes beside the certificate.
-pub fn outcome_of(of: &Of<Args>, bench: &dyn Bench, sources: &mut Sources) -> miette::Result<Outcome> {
+pub fn outcome_of(
+    of: &Of<Args>,
+    bench: &dyn Bench,
+    sources: &mut Sources,
+) -> miette::Result<CalibrationResult> {
     let (args, keep) = (&of.args, &*of.common.beside("amplitude"));
     let unit = match args.set_point.as_str() {
         "set_point_pp_m" => "m",
@@ -89,9 +93,9 @@ pub fn outcome_of(of: &Of<Args>, bench: &dyn Bench, sources: &mut Sources) -> mi
         move |e: AmplitudeError| miette::miette!("{shown}: no certificate: {e}")
     };
     let form = match args.form {
-        FormChoice::Proportional => Form::Proportional,
-        FormChoice::Affine => Form::Affine,
-        FormChoice::Bent => Form::Bent,
+        FormChoice::Proportional => GainForm::Proportional,
+        FormChoice::Affine => GainForm::Affine,
+        FormChoice::Bent => GainForm::Bent,
     };
     let (path, table, vibrometer) = match (&args.table, args.velocity_volts) {
         (None, _) if args.live.is_empty() => miette::bail!("give a --table, or --live with set-points"),

@@ -1,6 +1,6 @@
 //! `muprime calibrate step` and `muprime calibrate tap`: bandwidth and dead time of a channel, resonance of its mount.
 
-use super::{Outcome, Sources, columns};
+use super::{CalibrationResult, Sources, columns};
 use calibration::certificate::{Finding, Residuals};
 use calibration::force::characteristics::outcome;
 use calibration::force::dynamics::{Estimate, StepResponse, ring_down, step_responses};
@@ -23,7 +23,7 @@ type Record = (Vec<f64>, Vec<f64>);
 type Event = (Vec<(&'static str, &'static str, Estimate)>, [f64; 2]);
 
 /// Steps of force: a low-pass with dead time, of second order or of first.
-pub fn step(args: &Args, sources: &mut Sources) -> miette::Result<Outcome> {
+pub fn step(args: &Args, sources: &mut Sources) -> miette::Result<CalibrationResult> {
     run(args, sources, f64::NEG_INFINITY, |records| {
         let found = step_responses(records, 0.0)?;
         let event = |step: &StepResponse| {
@@ -45,7 +45,7 @@ pub fn step(args: &Args, sources: &mut Sources) -> miette::Result<Outcome> {
 }
 
 /// Taps: the free decay of the mount.
-pub fn tap(args: &Args, sources: &mut Sources) -> miette::Result<Outcome> {
+pub fn tap(args: &Args, sources: &mut Sources) -> miette::Result<CalibrationResult> {
     run(args, sources, 0.0, |records| {
         let event = |(k, (time, value)): (usize, &Record)| {
             let found = ring_down(time, value).map_err(|e| (k, e))?;
@@ -63,7 +63,7 @@ fn run(
     sources: &mut Sources,
     from_s: f64,
     fit: impl Fn(&[Record]) -> Result<((&'static str, f64), Vec<Event>), (usize, FitError)>,
-) -> miette::Result<Outcome> {
+) -> miette::Result<CalibrationResult> {
     let rows = columns(sources, &args.samples, ["event", "time_s", "value"], &[])?;
     let shown = args.samples.display();
     let numbered: Vec<&[[f64; 3]]> = rows.chunk_by(|a, b| a[0] == b[0]).collect();

@@ -1,11 +1,11 @@
 //! `muprime calibrate finger`.
 
 use super::inverse::{self, Options};
-use super::{More, Outcome, Sources, columns};
+use super::{CalibrationResult, More, Sources, columns};
 use calibration::finger::stiffness::{UltrasonicPoint, quasi_static, ultrasonic};
 use calibration::finger::{FingerError, FingerFit, friction, springs};
 use calibration::phase::table::read_phases;
-use models::rig_file::PassNoise;
+use models::PassNoise;
 use std::path::PathBuf;
 
 /// Arguments.
@@ -61,7 +61,7 @@ pub struct Args {
 }
 
 /// Calibrates; the skin and the springs that were identified go into `more`.
-pub fn outcome_of(args: &Args, sources: &mut Sources, more: &mut More) -> miette::Result<Outcome> {
+pub fn outcome_of(args: &Args, sources: &mut Sources, more: &mut More) -> miette::Result<CalibrationResult> {
     let mut found = FingerFit::default();
     let refused = |path: &PathBuf, e: FingerError| miette::miette!("{}: no certificate: {e}", path.display());
     for (name, path) in

@@ -1,6 +1,6 @@
 //! `muprime calibrate force`.
 
-use super::{Bench, Common, Outcome, SeriesOptions, Sources, with_columns};
+use super::{Bench, CalibrationResult, Common, SeriesOptions, Sources, with_columns};
 use calibration::force::matrix::{Linearity, Options, fit};
 use calibration::force::series::{self, Weighing};
 use runs::say;
@@ -53,7 +53,11 @@ pub struct Args {
 }
 
 /// Calibrates.
-pub fn outcome_of(args: &Args, bench: &dyn Bench, sources: &mut Sources) -> miette::Result<Outcome> {
+pub fn outcome_of(
+    args: &Args,
+    bench: &dyn Bench,
+    sources: &mut Sources,
+) -> miette::Result<CalibrationResult> {
     let weighing = Weighing {
         gravity_m_s2: args.gravity_m_s2,
         gravity_relative_sd: args.gravity_relative_sd,

@@ -1,6 +1,6 @@
 //! `muprime calibrate gravity`: where the sensor's axes point, by its own weight at known tilts.
 
-use super::{Outcome, Sources, columns};
+use super::{CalibrationResult, Sources, columns};
 use calibration::certificate::{Finding, Residuals};
 use calibration::force::characteristics::outcome;
 use calibration::force::gravity::{TiltReading, orientation};
@@ -15,7 +15,7 @@ pub struct Args {
 }
 
 /// Calibrates.
-pub fn outcome_of(args: &Args, sources: &mut Sources) -> miette::Result<Outcome> {
+pub fn outcome_of(args: &Args, sources: &mut Sources) -> miette::Result<CalibrationResult> {
     let rows = columns(sources, &args.tilts, ["tilt_rad", "lateral_force_n", "normal_force_n"], &[])?;
     let shown = args.tilts.display();
     let readings: Vec<TiltReading> =

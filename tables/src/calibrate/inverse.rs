@@ -7,7 +7,7 @@ use calibration::identify::{Identified, Search, identify};
 use calibration::phase::table::PhasePoint;
 use indicatif::{ProgressBar, ProgressDrawTarget, ProgressStyle};
 use miette::IntoDiagnostic;
-use models::quantity::PeakToPeak;
+use models::PeakToPeak;
 use models::ridge::{PhaseCurves, RidgeCase, Skin, SkinGrid};
 use runs::say;
 

@@ -1,6 +1,6 @@
 //! `muprime calibrate latency`.
 
-use super::{Outcome, Sources, columns};
+use super::{CalibrationResult, Sources, columns};
 use calibration::force::dynamics::step_responses;
 use calibration::latency::{channel_delay, clock, outcome};
 use calibration::uncertainty::Input;
@@ -24,7 +24,7 @@ pub struct Args {
 }
 
 /// Calibrates.
-pub fn outcome_of(args: &Args, sources: &mut Sources) -> miette::Result<Outcome> {
+pub fn outcome_of(args: &Args, sources: &mut Sources) -> miette::Result<CalibrationResult> {
     if args.edges.is_empty() && args.steps.is_empty() && args.clock.is_empty() {
         miette::bail!("give --edges, --steps or --clock at least once, as CHANNEL=FILE");
     }

@@ -1,6 +1,6 @@
 //! `muprime calibrate noise`: spectrum, lines, quantisation of a sensor at rest, and the rule for a frozen value.
 
-use super::{Outcome, Sources, columns};
+use super::{CalibrationResult, Sources, columns};
 use calibration::certificate::{Finding, Residuals};
 use calibration::force::characteristics::outcome;
 use calibration::force::noise::{
@@ -43,7 +43,7 @@ fn rail(samples: &[i64]) -> Option<i64> {
 }
 
 /// Calibrates.
-pub fn outcome_of(args: &Args, sources: &mut Sources) -> miette::Result<Outcome> {
+pub fn outcome_of(args: &Args, sources: &mut Sources) -> miette::Result<CalibrationResult> {
     if !(args.rate_hz > 0.0 && args.rate_hz.is_finite()) {
         miette::bail!("--rate-hz {}: above zero", args.rate_hz);
     }

@@ -1,13 +1,13 @@
 //! `muprime calibrate phase`: the paper's section 2 from recorded waveforms.
 
-use super::{Bench, Outcome, Sources, columns};
+use super::{Bench, CalibrationResult, Sources, columns};
 use calibration::amplitude::vibrometer::{Decoder, amplitude};
 use calibration::phase::{
     Acquisition, PhasePoint, RepeatedShift, Shift, Waveforms, outcome, repeated, shift, write_phases,
 };
-use models::quantity::PeakToPeak;
+use models::PeakToPeak;
+use runs::Setup;
 use runs::say;
-use runs::setup::Setup;
 use std::path::PathBuf;
 
 /// Arguments.
@@ -57,7 +57,11 @@ pub struct Args {
 }
 
 /// Calibrates.
-pub fn outcome_of(args: &Args, bench: &dyn Bench, sources: &mut Sources) -> miette::Result<Outcome> {
+pub fn outcome_of(
+    args: &Args,
+    bench: &dyn Bench,
+    sources: &mut Sources,
+) -> miette::Result<CalibrationResult> {
     let settings = |name: &String| bench.vibrometer(&Setup::load(name)?, args.frequency_hz);
     let settings = args.setup.as_ref().map(settings).transpose()?;
     settings.iter().for_each(|settings| say!("vibrometer: {settings}"));

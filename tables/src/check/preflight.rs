@@ -2,13 +2,12 @@
 
 use super::{On, problems_of};
 use miette::IntoDiagnostic;
-use models::prediction::{FrictionModel, SpringSlider};
-use realtime::ports::Nanos;
+use models::{FrictionModel, SpringSlider};
+use realtime::Nanos;
 use realtime::safety::{HARD, Limits};
 use runs::input::Problems;
-use runs::job::Job;
 use runs::plan::{Plan, Resolution};
-use runs::setup::Setup;
+use runs::{Job, Setup};
 use std::path::PathBuf;
 use std::sync::Arc;
 

@@ -6,13 +6,13 @@ use runs::input::{Problems, in_si, unit_of};
 use serde_json::{Map, Value};
 use std::ops::Range;
 use toml::de::DeTable;
-use tree::{Entry, Is, Node, Place, entries, types};
+use tree::{Entry, Is, Node, TextRange, entries, types};
 
 mod nearest;
 mod tree;
 
 struct Wrong {
-    place: Place,
+    place: TextRange,
     problem: String,
     remedy: Option<String>,
     /// What makes the rest readable: these bytes replaced by that.
@@ -131,14 +131,21 @@ fn mistyped(schema: &Value, Node { is, span }: &Node, path: &str) -> Wrong {
     let remedy = match (text, &number) {
         (_, Some(number)) => Some(format!("write it without quotation marks: {number}")),
         (Some(text), _) if Is::Number.admitted_by(schema) && !unit.is_empty() => {
-            runs::quantity::parse(text, unit).err()
+            runs::parse_quantity::parse(text, unit).err()
         }
         _ => None,
     };
     Wrong { place: span.clone(), problem, remedy, mend: span.clone().zip(number) }
 }
 
-fn object(root: &Value, schema: &Value, entries: &[Entry], path: &str, place: Place, wrong: &mut Vec<Wrong>) {
+fn object(
+    root: &Value,
+    schema: &Value,
+    entries: &[Entry],
+    path: &str,
+    place: TextRange,
+    wrong: &mut Vec<Wrong>,
+) {
     let none = Map::new();
     let properties = schema["properties"].as_object().unwrap_or(&none);
     let known: Vec<&str> = properties.keys().map(String::as_str).collect();

@@ -6,10 +6,10 @@ use crate::diagnose::unfit;
 use crate::import::{as_csv, remarks};
 use crate::schemas::schema::Kind;
 use miette::{IntoDiagnostic, WrapErr};
+use runs::Summary;
 use runs::input::{MAX_TABLE_BYTES, Problems, bytes_of};
-use runs::job::Summary;
 use runs::run_dir::RUN_AGAIN;
-use runs::sequence::Zeros;
+use runs::sweep::Zeros;
 use std::path::Path;
 
 /// A point table, as a diagnosis would take it; one of conditions has no lateral force.
@@ -63,7 +63,7 @@ pub(super) fn journal(path: &Path) -> miette::Result<Option<usize>> {
         let (what, read) = if sessions {
             ("session", serde_json::from_str::<runs::run_dir::Session>(line).map(drop))
         } else {
-            ("pass", serde_json::from_str::<runs::sequence::MeasuredPass>(line).map(drop))
+            ("pass", serde_json::from_str::<runs::sweep::MeasuredPass>(line).map(drop))
         };
         read.map_err(|e| miette::miette!("{}: line {}: no {what}: {e}", path.display(), i + 1))?;
     }

@@ -3,7 +3,7 @@
 use super::unit;
 use models::covariate::{self, Covariate};
 use realtime::compare::PassComparison;
-use runs::sequence::MeasuredPass;
+use runs::MeasuredPass;
 
 /// The cells of a column: numbers or text, missing values as `None`.
 pub enum Cells {

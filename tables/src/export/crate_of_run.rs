@@ -5,8 +5,7 @@
 use super::facts::Facts;
 use calibration::certificate::{date, sha256_hex};
 use miette::{Context, IntoDiagnostic};
-use runs::run_data::RunData;
-use runs::sequence::Outcome;
+use runs::{Outcome, RunData};
 use serde_json::{Value, json};
 use std::path::{Path, PathBuf};
 

@@ -4,8 +4,8 @@
 use super::columns::{Cells, Column, Table};
 use super::topics::SIGNALS;
 use miette::{Context, IntoDiagnostic};
+use realtime::Row;
 use realtime::recorder::{self, Entry, Reader};
-use realtime::turn::Row;
 use runs::run_dir::records_in;
 use std::fs::File;
 use std::io::BufReader;

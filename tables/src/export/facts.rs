@@ -1,7 +1,7 @@
 //! What goes with the numbers wherever they go: who, on what, with which instruments, certificates and
 //! versions, under which licence.
 
-use runs::run_data::RunData;
+use runs::RunData;
 use std::collections::BTreeMap;
 
 /// Facts by name.
@@ -9,7 +9,7 @@ pub type Facts = BTreeMap<String, String>;
 
 /// What is stated when a run is exported.
 #[derive(Clone, Debug, Default, clap::Args)]
-pub struct Stated {
+pub struct ExportFacts {
     /// Licence of the data: an SPDX identifier (CC-BY-4.0) or an address [default: the run's]
     #[arg(long, value_name = "ID")]
     pub licence: Option<String>,
@@ -20,7 +20,7 @@ pub struct Stated {
 
 /// The facts of a run: those of its record, and what its folder says of instruments and certificates. A
 /// licence that is stated now stands in place of the record's. What is not known is not there.
-pub fn of(run: &RunData, stated: &Stated) -> Facts {
+pub fn of(run: &RunData, stated: &ExportFacts) -> Facts {
     let mut facts = run.facts.clone();
     facts.remove(realtime::recorder::CHECKSUM);
     let profiles = run.files.keys().filter_map(|name| name.strip_prefix("profiles/")?.strip_suffix(".toml"));

@@ -6,9 +6,9 @@ mod signals;
 
 use super::columns::{self, Cells, Column};
 use super::unit;
+use realtime::Row;
 use realtime::recorder::EVENTS;
-use realtime::turn::Row;
-use runs::sequence::MeasuredPass;
+use runs::MeasuredPass;
 use serde_json::{Value, json};
 pub use signals::{SIGNALS, Signal};
 use std::io::Write as _;

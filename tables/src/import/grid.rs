@@ -1,7 +1,7 @@
 //! A table of any format as cells. `head` finds where its headers are.
 
 use super::values::Dropped;
-use instruments::units::Unit;
+use instruments::Unit;
 use miette::IntoDiagnostic;
 
 /// A cell.

@@ -3,17 +3,17 @@
 use super::grid::{Cell, Grid};
 use super::map::{Map, Taken, parts, stated, unit_row};
 use super::remarks::usual;
-use super::targets::{Id, Target, plain};
+use super::targets::{ColumnTarget, Id, plain};
 use super::values::all_differ;
-use instruments::units::{Dimension, Unit};
+use instruments::{Dimension, Unit};
 
 /// What a header means, and the unit that it states.
-type Meaning = (&'static Target, Option<(String, Unit)>);
+type Meaning = (&'static ColumnTarget, Option<(String, Unit)>);
 
 /// The columns that `stated` leaves open, from the headers: names that usually mean one thing, with the units
 /// that the headers state. A header that two columns answer to is left to the reader.
 pub fn guess(grid: &Grid, stated: &Map) -> Vec<Taken> {
-    let is_open = |target: &Target| {
+    let is_open = |target: &ColumnTarget| {
         let otherwise = stated.time_by_rows && target.id == Id::Time
             || stated.has(Id::Velocity) && target.id == Id::Direction;
         !otherwise && !stated.gives(target.column)
@@ -111,10 +111,10 @@ fn outside(header: &str) -> String {
 
 /// The unit that a column states although none of its quantity's units is meant, with that quantity: why a
 /// column with a known name is not guessed.
-pub fn open_unit(grid: &Grid, index: usize) -> Option<(&'static Target, &str)> {
+pub fn open_unit(grid: &Grid, index: usize) -> Option<(&'static ColumnTarget, &str)> {
     let (header, row) = (&grid.header[index], unit_row(&grid.units, index));
     let name = name_of(header);
-    let target = Target::headed(&name)?;
+    let target = ColumnTarget::headed(&name)?;
     let none = |unit: &&str| target.dimension().is_some_and(|d| Unit::guess(d, unit).is_none());
     let unit = parts(header).map(|(_, unit)| unit).find(none).or_else(|| stated(header)).or(row);
     let unit = unit.map(str::trim).filter(|unit| !unit.is_empty())?;
@@ -167,7 +167,7 @@ fn without_stroke(header: &str) -> Option<(String, Id)> {
 
 /// The unit that the source states for a column that is taken for `target`: in a row of units or in the
 /// header.
-pub fn unit_of(grid: &Grid, index: usize, target: &Target) -> Option<(String, Unit)> {
+pub fn unit_of(grid: &Grid, index: usize, target: &ColumnTarget) -> Option<(String, Unit)> {
     let dimension = target.dimension()?;
     let (header, row) = (&grid.header[index], unit_row(&grid.units, index));
     let plainly = row.or_else(|| stated(header)).and_then(|text| Unit::guess(dimension, text));
@@ -194,7 +194,7 @@ fn meant(header: &str, row_of_units: Option<&str>) -> Option<Meaning> {
 
 fn named(header: &str, row_of_units: Option<&str>) -> Option<Meaning> {
     let with_unit = |name: &str, text: &str| {
-        let target = Target::headed(name)?;
+        let target = ColumnTarget::headed(name)?;
         let dimension = target.dimension()?;
         // Friction without a dimension is the coefficient.
         if target.id == Id::FrictionForce
@@ -220,7 +220,7 @@ fn named(header: &str, row_of_units: Option<&str>) -> Option<Meaning> {
     if header.split_once(['(', '[', '{']).is_some_and(|(_, rest)| !plain(rest).is_empty()) {
         return None;
     }
-    let target = Target::headed(header)?;
+    let target = ColumnTarget::headed(header)?;
     // A unit that is none of this quantity says that the column is something else, or needs more than a name;
     // signs are units too.
     let sign = header.contains(['%', '°', '‰']) || stated(header).is_some_and(|u| !u.trim().is_empty());

@@ -1,8 +1,8 @@
 //! Which column of the source is what: stated by `--map` and `--set`, or guessed from the headers.
 
 use super::grid::Grid;
-use super::targets::{Id, TARGETS, Target, plain};
-use instruments::units::Unit;
+use super::targets::{ColumnTarget, Id, TARGETS, plain};
+use instruments::Unit;
 
 mod doubts;
 mod entries;
@@ -21,7 +21,7 @@ pub struct Taken {
     /// Its header.
     pub header: String,
     /// What it stands for.
-    pub target: &'static Target,
+    pub target: &'static ColumnTarget,
     /// Its unit as stated; empty for what has none.
     pub unit_text: String,
     /// Its unit.
@@ -34,7 +34,7 @@ pub struct Taken {
 #[derive(Clone, Debug)]
 pub struct Constant {
     /// What it stands for.
-    pub target: &'static Target,
+    pub target: &'static ColumnTarget,
     /// As it was written.
     pub text: String,
     /// SI; NaN for text.
@@ -57,7 +57,7 @@ pub const ONCE: &str = "keep one of them: name it in --map, and leave the other 
 
 impl Map {
     /// All targets that are mapped or set.
-    fn targets(&self) -> impl Iterator<Item = &'static Target> {
+    fn targets(&self) -> impl Iterator<Item = &'static ColumnTarget> {
         self.columns.iter().map(|c| c.target).chain(self.constants.iter().map(|c| c.target))
     }
 

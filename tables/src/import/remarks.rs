@@ -2,11 +2,9 @@
 
 use super::values::{all_differ, middle, sorted};
 use diagnosis::data::{DataError, Table};
-use models::condition::Condition;
 use models::covariate::{self, Covariate};
-use models::finger::Finger;
-use models::pass::Pass;
-use runs::human::number;
+use models::{Condition, Finger, Pass};
+use runs::format::number;
 use serde::Serialize;
 
 /// A column's range, in SI.

@@ -1,6 +1,6 @@
 //! What a column of a foreign table can stand for, and which headers usually say so.
 
-use instruments::units::Dimension;
+use instruments::Dimension;
 
 /// How a cell is read.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -17,7 +17,7 @@ pub enum ColumnKind {
 
 /// One thing that a column can stand for.
 #[derive(Debug)]
-pub struct Target {
+pub struct ColumnTarget {
     /// Which one it is.
     pub id: Id,
     /// Name in `--map` and `--set`.
@@ -41,8 +41,8 @@ macro_rules! targets {
         /// How many targets there are.
         pub const COUNT: usize = [$($name),*].len();
         /// Every target, in the order of presentation.
-        pub static TARGETS: &[Target] =
-            &[$(Target { id: Id::$id, name: $name, column: $column, kind: $kind, words: $words, headers: &[$($header),*] }),*];
+        pub static TARGETS: &[ColumnTarget] =
+            &[$(ColumnTarget { id: Id::$id, name: $name, column: $column, kind: $kind, words: $words, headers: &[$($header),*] }),*];
     };
 }
 
@@ -78,20 +78,20 @@ targets! {
 
 impl Id {
     /// What stands there.
-    pub fn target(self) -> &'static Target {
+    pub fn target(self) -> &'static ColumnTarget {
         &TARGETS[self as usize]
     }
 }
 
-impl Target {
+impl ColumnTarget {
     /// The target of that name, or of that column of the point table.
-    pub fn named(name: &str) -> Option<&'static Target> {
+    pub fn named(name: &str) -> Option<&'static ColumnTarget> {
         let exact = TARGETS.iter().find(|t| t.name == name);
         exact.or_else(|| TARGETS.iter().find(|t| t.column == name))
     }
 
     /// The target that a header usually means.
-    pub fn headed(header: &str) -> Option<&'static Target> {
+    pub fn headed(header: &str) -> Option<&'static ColumnTarget> {
         let plain = plain(header);
         let is = |name: &str| self::plain(name) == plain;
         TARGETS.iter().find(|t| is(t.name) || is(t.column) || t.headers.contains(&plain.as_str()))

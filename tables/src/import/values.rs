@@ -3,11 +3,9 @@
 use super::grid::{Cell, Grid, Row};
 use super::map::{Map, way};
 use super::targets::{COUNT, ColumnKind, Id};
-use instruments::units::{Dimension, Unit};
-use models::condition::Condition;
+use instruments::{Dimension, Unit};
 use models::covariate;
-use models::pass::Pass;
-use models::quantity::PeakToPeak;
+use models::{Condition, Pass, PeakToPeak};
 use serde::Serialize;
 
 /// Why a cell of a number is not taken.

@@ -3,7 +3,7 @@
 use super::clock::DAY_S;
 use super::grid::{Cell, Grid, Row};
 use super::head::Source;
-use instruments::units::Unit;
+use instruments::Unit;
 use miette::IntoDiagnostic;
 use std::collections::BTreeMap;
 

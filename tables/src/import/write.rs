@@ -4,9 +4,9 @@ use super::grid::csv_of;
 use super::map::Map;
 use super::values::{middle, sorted};
 use miette::{IntoDiagnostic, WrapErr};
+use models::PeakToPeak;
 use models::covariate::{self, Covariate};
 use models::pass::{Pass, read_passes, write_passes};
-use models::quantity::PeakToPeak;
 use runs::fingertip::{Fingertip, FingertipSetup};
 use std::collections::BTreeMap;
 use std::path::Path;
@@ -183,9 +183,7 @@ pub fn rig(passes: &[Pass], source: &str, tip: Option<&str>) -> miette::Result<(
 #[cfg(test)]
 mod tests {
     use super::{repeatability, split};
-    use models::condition::Condition;
-    use models::pass::Pass;
-    use models::quantity::Direction;
+    use models::{Condition, Direction, Pass};
 
     /// Pairs of passes over loads of 50 mN to 1 N whose friction scatters by a share and by an amount in N.
     fn pairs(relative: f64, force_n: f64) -> Vec<Pass> {

@@ -63,7 +63,7 @@ impl Kind {
             Kind::Profile => instruments::schema::json_schema(),
             Kind::Verdict => {
                 let writes = SchemaSettings::draft2020_12().for_serialize();
-                writes.into_generator().into_root_schema_for::<diagnosis::document::Document<'_>>()
+                writes.into_generator().into_root_schema_for::<diagnosis::report::document::Document<'_>>()
             }
         };
         schema.to_value()

@@ -2,9 +2,7 @@
 
 use rig::live::{Ended, Feed, Run};
 use runs::job::{Job, Notes, Signals, Update};
-use runs::plan::Plan;
-use runs::sequence::Event;
-use runs::setup::Setup;
+use runs::{Event, Plan, Setup};
 use serde_json::Value;
 use std::io::{BufRead, BufReader, Read, Write};
 use std::net::TcpStream;
@@ -106,7 +104,7 @@ impl Paced {
             let planned = job.points().unwrap().len();
             let as_by_a_clock = Run { fast: false, ..Run::of(&job, planned, 0) };
             let mut feed = Feed::new(as_by_a_clock, Vec::new(), &asked);
-            let summary = rig::wall_run::run(job, &asked, &mut |update| {
+            let summary = rig::wall_clock_run::run(job, &asked, &mut |update| {
                 feed.update(&update);
                 if matches!(update, Update::State(_)) {
                     std::thread::sleep(pace);

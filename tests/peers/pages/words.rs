@@ -1,9 +1,7 @@
 //! What pages and the terminal say is so: each of these once said something that its own numbers contradict.
 
 use runs::job::{Job, Notes, Signals, Update};
-use runs::plan::Plan;
-use runs::sequence::Event;
-use runs::setup::Setup;
+use runs::{Event, Plan, Setup};
 use std::path::{Path, PathBuf};
 use std::process::Output;
 use std::sync::Arc;

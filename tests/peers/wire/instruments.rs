@@ -1,9 +1,9 @@
 //! Bundled instruments that are a file and no more, each against one in Python that knows nothing of ours; bytes on the wire.
 
 use super::lines::{plant, pty, setup, socat_pair};
-use drivers::library::Source;
+use drivers::user_profiles::Source;
 use drivers::{AxisSetup, InstrumentSetup, InstrumentsSetup};
-use realtime::ports::Nanos;
+use realtime::Nanos;
 use realtime::safety::{DriveCommand, StageCommand};
 use sim::wire::device::Device;
 use sim::wire::streams::NetworkStream;

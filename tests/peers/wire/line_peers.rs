@@ -2,7 +2,7 @@
 
 use super::lines::{adapter, axes, device, expect_forces, plant, pty, setup, socat_pair, standing_forces};
 use drivers::InstrumentSetup;
-use realtime::ports::Nanos;
+use realtime::Nanos;
 use sim::wire::can::{CanDevice, CanEmulator};
 use sim::wire::serial::SerialEmulator;
 use sim::wire::{Command, Quantity};

@@ -2,8 +2,7 @@
 
 use drivers::slcan::Slcan;
 use drivers::{AxisSetup, InstrumentSetup, InstrumentsSetup};
-use instruments::bus::{CanEvent, CanPort};
-use instruments::codec::can::CanFrame;
+use instruments::{CanEvent, CanFrame, CanPort};
 use realtime::ports::{Nanos, NoData};
 use realtime::safety::DriveCommand;
 use serialport::{SerialPort, TTYPort};
@@ -160,7 +159,7 @@ const WRONG: u16 = 12_345;
 
 /// An FT 300 with a prank from the tenth request on.
 fn rtu_prankster(prank: Prank) -> (String, Arc<AtomicUsize>, Arc<AtomicBool>) {
-    use instruments::codec::modbus_rtu::{Heard, Operation, give, hear};
+    use instruments::codec::modbus_rtu::{Operation, Parsed, give, hear};
     let (mut port, path) = pty();
     let (count, stop) = (Arc::new(AtomicUsize::new(0)), Arc::new(AtomicBool::new(false)));
     let (counted, stopped) = (Arc::clone(&count), Arc::clone(&stop));
@@ -174,13 +173,13 @@ fn rtu_prankster(prank: Prank) -> (String, Arc<AtomicUsize>, Arc<AtomicBool>) {
                 Err(_) => std::thread::sleep(Duration::from_millis(1)),
             }
             let (address, length) = match hear(&heard, &[]) {
-                Heard::Incomplete => continue,
-                Heard::Noise => {
+                Parsed::Incomplete => continue,
+                Parsed::Noise => {
                     heard.remove(0);
                     continue;
                 }
-                Heard::Request(_, Operation::Read { address, .. }, length) => (address, length),
-                Heard::Request(_, _, length) => (0, length),
+                Parsed::Request(_, Operation::Read { address, .. }, length) => (address, length),
+                Parsed::Request(_, _, length) => (0, length),
             };
             heard.drain(..length);
             let request = counted.fetch_add(1, Ordering::SeqCst);

@@ -3,8 +3,8 @@
 
 use super::lines::{plant, pty, setup, socat_pair};
 use drivers::InstrumentSetup;
-use drivers::library::Source;
-use realtime::ports::Nanos;
+use drivers::user_profiles::Source;
+use realtime::Nanos;
 use realtime::safety::DriveCommand;
 use sim::wire::device::Device;
 use sim::wire::lines::LineInstrument;
@@ -276,7 +276,7 @@ fn a_sweep_with_the_board_as_its_force_sensor() {
         let found: Vec<(f64, f64, f64)> = passes
             .lines()
             .filter_map(|line| {
-                let pass: runs::sequence::MeasuredPass = serde_json::from_str(line).unwrap();
+                let pass: runs::sweep::MeasuredPass = serde_json::from_str(line).unwrap();
                 let compared = pass.comparison?;
                 let amplitude = pass.pass.amplitude.metres();
                 Some((amplitude, compared.mu_relative?, compared.mu_relative_sd?))

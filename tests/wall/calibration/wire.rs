@@ -9,13 +9,12 @@
 use calibration::force::dynamics::step_responses;
 use calibration::force::series::Weighing;
 use calibration::latency::channel_delay;
-use models::prediction::{FrictionModel, SpringSlider};
-use models::quantity::PeakToPeak;
+use models::{FrictionModel, PeakToPeak, SpringSlider};
+use realtime::Nanos;
 use realtime::cycle::{Command, CycleState, Marker};
-use realtime::ports::Nanos;
+use realtime::cycle_io::{Ports, Tick, run_cycle};
 use realtime::safety::Request;
-use realtime::turn::{Ports, Tick, turn};
-use runs::setup::Setup;
+use runs::Setup;
 use sim::defects::Defects;
 use sim::noise::Noise;
 use sim::wire::SharedPlant;
@@ -371,7 +370,7 @@ fn a_withheld_amplitude_scale_is_found_over_modbus() {
             number += 1;
             let now = Nanos(u64::try_from(epoch.elapsed().as_nanos()).unwrap());
             let tick = Tick { number, lateness: Nanos(0), now };
-            let row = turn(&setup.config, &*model, &mut state, &mut ports, &mut || commands.pop(), tick);
+            let row = run_cycle(&setup.config, &*model, &mut state, &mut ports, &mut || commands.pop(), tick);
             armed = row.armed;
             if let Some(trip) = row.tripped {
                 eprintln!("tripped: {trip:?}");

@@ -3,7 +3,7 @@
 //! Passes differ by the sensors' noise and the instants of sampling. What they may differ by is the
 //! uncertainty that each run states for each `mu'`, which follows from the repeatability in its setup.
 
-use runs::sequence::MeasuredPass;
+use runs::MeasuredPass;
 use std::collections::BTreeMap;
 use std::path::Path;
 use std::process::Command;

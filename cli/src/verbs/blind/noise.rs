@@ -4,7 +4,7 @@ use super::super::prelude::*;
 use super::Args;
 use sim::sealed::rough::{RoughSet, Roughness};
 use studies::progress::Study;
-use studies::validation::blind::rough::{self, Answers, TRUTHS};
+use studies::validation::blind::rough::{self, NoiseScore, TRUTHS};
 
 /// Answers on scatter that is not what rig.toml states.
 pub fn run(args: &Args, kind: &str, json: bool) -> miette::Result<ExitCode> {
@@ -16,13 +16,13 @@ pub fn run(args: &Args, kind: &str, json: bool) -> miette::Result<ExitCode> {
     }
     let options = args.of.options()?;
     let (seed, sets, all) = (args.of.seed, args.sets, args.sets * TRUTHS.len() * picked.len());
-    let study = Study::begin(all as u64, "sets", move |found: Vec<Answers>, done| {
+    let study = Study::begin(all as u64, "sets", move |found: Vec<NoiseScore>, done| {
         if !json {
             out!("partial: {done} of {all} sets");
         }
-        tell(&Answers::summed(&found), seed, sets, true, json);
+        tell(&NoiseScore::summed(&found), seed, sets, true, json);
     })?;
-    let each = |seed: u64, set: &RoughSet, report: &diagnosis::verdict::Report, one: &Answers| {
+    let each = |seed: u64, set: &RoughSet, report: &diagnosis::report::Report, one: &NoiseScore| {
         if args.verbose {
             let suspects: Vec<u64> = report.scatter.suspects.iter().map(|s| s.point).collect();
             let (s, text) = (&report.scatter, &report.text);
@@ -37,7 +37,7 @@ pub fn run(args: &Args, kind: &str, json: bool) -> miette::Result<ExitCode> {
         }
         study.done(Some(one.clone()));
     };
-    let mut rows: Vec<Answers> = Vec::new();
+    let mut rows: Vec<NoiseScore> = Vec::new();
     for kind in picked {
         rows.extend(rough::run(seed, sets, kind, &TRUTHS, &options, each)?);
     }
@@ -46,7 +46,7 @@ pub fn run(args: &Args, kind: &str, json: bool) -> miette::Result<ExitCode> {
     Ok(ExitCode::SUCCESS)
 }
 
-fn tell(rows: &[Answers], seed: u64, sets: usize, partial: bool, json: bool) {
+fn tell(rows: &[NoiseScore], seed: u64, sets: usize, partial: bool, json: bool) {
     if json {
         let mut report = json!({
             "schema": "muprime.blind.noise/1", "seed": seed, "sets": sets, "rows": rows,
@@ -61,7 +61,7 @@ fn tell(rows: &[Answers], seed: u64, sets: usize, partial: bool, json: bool) {
     );
     out!("|---|---|---|---|---|---|---|---|---|---|");
     for a in rows {
-        let Answers { noise, truth, sets, right, wrong, ambiguous, unknown, missed, .. } = a;
+        let NoiseScore { noise, truth, sets, right, wrong, ambiguous, unknown, missed, .. } = a;
         let (found, others) = (format!("{}/{}", a.found, a.bad), format!("{}/{}", a.falsely, a.good));
         out!(
             "| {noise} | {truth} | {sets} | {right} | {wrong} | \

@@ -2,7 +2,7 @@
 
 use super::super::prelude::*;
 use clap::ValueEnum;
-use drivers::peek::{self, Place, Speed};
+use drivers::peek::{self, PeekAddress, Speed};
 use instruments::schema::Table;
 use std::time::Duration;
 
@@ -67,7 +67,7 @@ fn range(text: &str) -> Result<(u16, u16), String> {
 
 /// Shows what is there; fails where nobody answers, or the answer is no good.
 pub fn run(args: &Args, json: bool) -> miette::Result<ExitCode> {
-    let place = Place::of(&args.address);
+    let place = PeekAddress::of(&args.address);
     let speed = Speed { baud: args.baud, format: args.format.clone() };
     let long = args.seconds;
     let failed = |why: peek::PeekError| miette::miette!("{}: {why}", args.address);
@@ -80,7 +80,7 @@ pub fn run(args: &Args, json: bool) -> miette::Result<ExitCode> {
         };
         let found = peek::registers(&place, &speed, args.unit, table, (first, count)).map_err(failed)?;
         registers(first, &found, json);
-    } else if let Place::Can(name) = &place {
+    } else if let PeekAddress::Can(name) = &place {
         frames(&peek::frames(name, args.bitrate, long).map_err(failed)?, long, json);
     } else if args.address.starts_with("rtu:") {
         miette::bail!(

@@ -76,7 +76,7 @@ pub fn run(args: &AdaptArgs, json: bool) -> miette::Result<ExitCode> {
     checked(&args.rounds)?;
     let (spans, base) = (spans(&args.span)?, values(&args.set)?);
     let steady = Steady { tolerance: args.tolerance, at_most: args.at_most, ..Steady::default() };
-    let header = |spans: BTreeMap<String, ridge::Span>, cases: u64| {
+    let header = |spans: BTreeMap<String, ridge::ValueRange>, cases: u64| {
         let (elements, base) = (args.elements, base.clone());
         let settings = ridge::Settings { elements, steady, base, spans, first: HELD_OUT_FROM, case: None };
         settings.check_spans()?;
@@ -97,7 +97,8 @@ pub fn run(args: &AdaptArgs, json: bool) -> miette::Result<ExitCode> {
             break;
         }
         let line = |steps: &Vec<(u8, u32)>| {
-            let value = |((name, span), x): ((&String, &ridge::Span), f64)| (name.clone(), json!(span.at(x)));
+            let value =
+                |((name, span), x): ((&String, &ridge::ValueRange), f64)| (name.clone(), json!(span.at(x)));
             Value::Object(spans.iter().zip(place_of(steps)).map(value).collect())
         };
         let lines: Vec<Value> = new.iter().map(line).collect();

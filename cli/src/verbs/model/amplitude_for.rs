@@ -6,9 +6,8 @@ use crate::verbs::prelude::*;
 use clap::Args;
 use models::inverse;
 use models::prediction::Validity;
-use models::quantity::PeakToPeak;
-use models::surrogate::Surrogate;
-use runs::human::{number, quantity, to_its_uncertainty};
+use models::{PeakToPeak, Surrogate};
+use runs::format::{number, quantity, to_its_uncertainty};
 
 /// Arguments of `muprime model amplitude-for`.
 #[derive(Args)]

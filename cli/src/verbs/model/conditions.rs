@@ -1,11 +1,10 @@
 //! The flags for the condition of a model, with the paper's defaults.
 
 use clap::Args;
-use models::condition::Condition;
-use models::quantity::PeakToPeak;
 use models::ridge::{RidgeCase, case};
+use models::{Condition, PeakToPeak};
 use realtime::safety::HARD;
-use runs::human::quantity;
+use runs::format::quantity;
 use runs::input::{unit_meant, unit_of};
 
 /// One operating point. Defaults are the paper's nominal case.

@@ -3,7 +3,7 @@
 use crate::verbs::prelude::*;
 use clap::Args;
 use effects::effect::Prior;
-use runs::human::number;
+use runs::format::number;
 
 #[derive(Args)]
 pub struct EffectsArgs {

@@ -3,8 +3,8 @@
 use super::refused;
 use crate::verbs::prelude::*;
 use clap::Args;
+use models::Reading;
 use models::psi_fit::PsiFit;
-use models::reading::Reading;
 use models::ridge::patch::{Patch, plane_stress};
 use models::ridge::{RidgeCase, RidgeError, RunSettings, run as run_ridge, short_study};
 

@@ -5,16 +5,12 @@ use super::refused;
 use crate::verbs::prelude::*;
 use clap::Args;
 use clap::builder::{PossibleValuesParser, TypedValueParser};
-use models::condition::Condition;
-use models::finger::Finger;
-use models::law::BuiltIn;
 use models::prediction::EmpiricalPsi;
 use models::psi::{PsiEq16, PsiEq17};
-use models::reading::Reading;
 use models::rig_file::STIFFNESS_N_PER_M;
 use models::spring_slider;
-use models::surrogate::Surrogate;
-use runs::human::quantity;
+use models::{BuiltIn, Condition, Finger, Reading, Surrogate};
+use runs::format::quantity;
 use serde::Serialize;
 
 /// Reads a law's name on the command line.

@@ -6,11 +6,11 @@ use super::conditions::{ConditionArgs, ContactArgs};
 use super::refused;
 use crate::verbs::prelude::*;
 use clap::{Args, ValueEnum};
-use models::reading::Reading;
+use models::Reading;
 use models::ridge::{
     self, FrictionRule, RidgeCase, RidgeError, RidgeProfile, RidgeRun, RunSettings, Strain, case,
 };
-use runs::human::{number, quantity};
+use runs::format::{number, quantity};
 use serde::Serialize;
 use start::OtherStart;
 use std::time::Instant;

@@ -4,7 +4,7 @@ use super::conditions::ContactArgs;
 use super::refused;
 use crate::verbs::prelude::*;
 use clap::Args;
-use models::reading::Reading;
+use models::Reading;
 use models::ridge::short_study;
 use models::ridge::static_stiffness::{HeldAt, StaticStiffness, of_case};
 use models::ridge::{FrictionRule, RidgeCase, RidgeError, RidgeGeometry, RidgeProfile, Strain, case};

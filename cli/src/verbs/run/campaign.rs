@@ -2,8 +2,8 @@
 
 use super::{Args, folder as folder_of, job_of, measure, serve, watched};
 use crate::verbs::prelude::*;
+use runs::Job;
 use runs::campaign::{self, Campaign};
-use runs::job::Job;
 use std::sync::atomic::Ordering;
 use studies::campaign::claims::Claim;
 

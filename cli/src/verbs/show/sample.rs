@@ -2,10 +2,9 @@
 
 use super::super::prelude::*;
 use clap::ValueEnum;
-use models::prediction::SpringSlider;
+use models::SpringSlider;
 use runs::job::{Job, Notes, Signals};
-use runs::plan::Plan;
-use runs::setup::Setup;
+use runs::{Plan, Setup};
 use std::fmt::Write;
 use std::sync::Arc;
 
@@ -68,7 +67,7 @@ pub fn write(sample: Sample, folder: &Path) -> miette::Result<PathBuf> {
         notes: Notes { sample: Some(format!("sample of muprime: {}", sample.tip())), ..Notes::default() },
         answers: None,
     };
-    rig::wall_run::run(job, &Signals::default(), &mut |_| {})?;
+    rig::wall_clock_run::run(job, &Signals::default(), &mut |_| {})?;
     let table = folder.join("points.csv");
     if sample != Sample::Foreign {
         return Ok(table);

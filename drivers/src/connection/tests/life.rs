@@ -12,17 +12,17 @@ use std::sync::Mutex;
 use std::sync::mpsc::{Receiver, sync_channel};
 use std::time::Instant;
 
-fn io(text: &str) -> Ended {
-    Ended::from(std::io::Error::other(text))
+fn io(text: &str) -> LinkError {
+    LinkError::from(std::io::Error::other(text))
 }
 
 /// What a conversation does: the so manieth, from 1.
-type Script = dyn FnMut(usize, &mut Connection) -> Ended + Send;
+type Script = dyn FnMut(usize, &mut Connection) -> LinkError + Send;
 
 /// A link on its thread.
 struct Link {
     stop: Arc<AtomicBool>,
-    opened: Receiver<Result<(), Ended>>,
+    opened: Receiver<Result<(), LinkError>>,
     port: Arc<Mutex<AmplifierPort>>,
     /// When each conversation began and ended.
     times: Arc<Mutex<Vec<(Instant, Instant)>>>,
@@ -80,11 +80,11 @@ fn works(number: usize, connection: &mut Connection, on: bool) {
 }
 
 /// 'Off' leaves and is read back.
-fn switches_off(number: usize, connection: &mut Connection) -> Ended {
+fn switches_off(number: usize, connection: &mut Connection) -> LinkError {
     connection.endpoint.hand_out_off(connection.now());
     std::thread::sleep(Duration::from_millis(1));
     works(number, connection, false);
-    Ended::Stopped
+    LinkError::Stopped
 }
 
 #[test]
@@ -110,7 +110,7 @@ fn an_orderly_end_says_what_was_read_back() {
         1,
         Box::new(|_, connection| {
             connection.tell(Ok(()));
-            Ended::Stopped
+            LinkError::Stopped
         }),
     );
     assert!(matches!(link.closed(), Closed::NotReadBack(why) if why.contains("before a state")));
@@ -124,7 +124,7 @@ fn a_lost_link_is_made_anew_until_it_is_to_end() {
         Box::new(|number, connection| match number {
             1..=3 => {
                 works(number, connection, false);
-                if number == 2 { Ended::Timeout(50) } else { io("cut") }
+                if number == 2 { LinkError::Timeout(50) } else { io("cut") }
             }
             4 => panic!("a fault of {}", "this program"),
             _ => switches_off(number, connection),
@@ -204,7 +204,7 @@ fn pauses_double_up_to_the_longest_and_begin_anew_after_a_good_link() {
                     works(number, connection, false);
                     io("cut")
                 }
-                _ => Ended::Stopped,
+                _ => LinkError::Stopped,
             }),
         );
         link.closed();
@@ -224,7 +224,7 @@ fn pauses_double_up_to_the_longest_and_begin_anew_after_a_good_link() {
         30,
         Box::new(|number, connection| {
             connection.tell(Ok(()));
-            if number < 12 { io("nobody") } else { Ended::Stopped }
+            if number < 12 { io("nobody") } else { LinkError::Stopped }
         }),
     );
     link.closed();

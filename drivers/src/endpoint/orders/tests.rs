@@ -191,11 +191,11 @@ fn only_what_takes_safe_set_points_is_switched_off() {
     assert_eq!(
         roles,
         [
-            (Role::Force, false),
-            (Role::Amplifier, true),
-            (Role::Stage, true),
-            (Role::Supply, true),
-            (Role::Contacts, false)
+            (PortRole::Force, false),
+            (PortRole::Amplifier, true),
+            (PortRole::Stage, true),
+            (PortRole::Supply, true),
+            (PortRole::Contacts, false)
         ]
     );
     let mut bare = profile("muprime-amplifier").unwrap();

@@ -357,8 +357,7 @@ fn slide<const N: usize>(
 mod tests {
     use super::*;
     use crate::{Active, Baseline, Design, Effect, by_name, lateral_force};
-    use models::condition::Condition;
-    use models::quantity::PeakToPeak;
+    use models::{Condition, PeakToPeak};
 
     /// The control loop asks a prepared model for any condition: no node may be made there, which takes milliseconds. One
     /// law with a damping that is the same at any speed of the plate, and one with a power of it.

@@ -31,10 +31,10 @@ fn all_but(left_out: impl Fn(u64) -> bool) -> Vec<(u32, u64)> {
 #[test]
 fn commands_are_lost_in_the_time_of_the_fault_and_only_there() {
     for mode in [FaultMode::Off, FaultMode::Disconnected, FaultMode::Corrupt] {
-        let lost = arrived(&[fault(Target::Drive, mode, 0.0)], 1, 30);
+        let lost = arrived(&[fault(FaultTarget::Drive, mode, 0.0)], 1, 30);
         assert_eq!(lost, all_but(|cycle| ACTS.contains(&cycle)), "{mode:?}");
         // The way of the states is another.
-        assert_eq!(arrived(&[fault(Target::Amplifier, mode, 0.0)], 1, 30), all_but(|_| false));
+        assert_eq!(arrived(&[fault(FaultTarget::Amplifier, mode, 0.0)], 1, 30), all_but(|_| false));
     }
 }
 
@@ -52,22 +52,22 @@ fn faults_of_readings_leave_commands_alone() {
         FaultMode::Disordered,
         FaultMode::ClockJump,
     ] {
-        assert_eq!(arrived(&[fault(Target::Drive, mode, 1.0)], 1, 30), all_but(|_| false), "{mode:?}");
+        assert_eq!(arrived(&[fault(FaultTarget::Drive, mode, 1.0)], 1, 30), all_but(|_| false), "{mode:?}");
     }
 }
 
 #[test]
 fn a_slow_way_carries_one_command_in_so_many() {
-    let slow = arrived(&[fault(Target::Drive, FaultMode::Slow, 4.0)], 1, 30);
+    let slow = arrived(&[fault(FaultTarget::Drive, FaultMode::Slow, 4.0)], 1, 30);
     // The command of cycle n is the one numbered n + 1.
     assert_eq!(slow, all_but(|cycle| ACTS.contains(&cycle) && (cycle + 1) % 4 != 0));
-    assert_eq!(arrived(&[fault(Target::Drive, FaultMode::Slow, 0.0)], 1, 30), all_but(|_| false));
+    assert_eq!(arrived(&[fault(FaultTarget::Drive, FaultMode::Slow, 0.0)], 1, 30), all_but(|_| false));
 }
 
 #[test]
 fn an_intermittent_way_loses_its_share_the_same_from_the_same_seed() {
     for share in [0.1, 0.9] {
-        let run = |seed| arrived(&[always(Target::Drive, FaultMode::Intermittent, share)], seed, 4000);
+        let run = |seed| arrived(&[always(FaultTarget::Drive, FaultMode::Intermittent, share)], seed, 4000);
         assert!(about(4000 - run(3).len(), 4000, share), "{} of 4000 at {share}", run(3).len());
         assert_eq!(run(3), run(3));
         assert_ne!(run(3), run(4));
@@ -78,7 +78,7 @@ fn an_intermittent_way_loses_its_share_the_same_from_the_same_seed() {
 #[test]
 fn a_delayed_command_arrives_by_so_much_later_and_once() {
     // Far more than are under way at a time: the places for them are used again.
-    let late = arrived(&[always(Target::Drive, FaultMode::Delayed, 0.02)], 1, 1000);
+    let late = arrived(&[always(FaultTarget::Drive, FaultMode::Delayed, 0.02)], 1, 1000);
     let expected: Vec<(u32, u64)> = (20..1000).map(|cycle| (cycle as u32 - 20, cycle)).collect();
     assert_eq!(late, expected);
 }
@@ -92,7 +92,7 @@ fn a_newer_command_is_the_last_when_the_delay_is_over() {
         state: |_: Nanos| Err(NoData::NeverRead),
         command: move |command: DriveCommand, _: Nanos| into.lock().unwrap().push(command.sequence()),
     };
-    let mut faulty = FaultyAmplifier::new(port, &[fault(Target::Drive, FaultMode::Delayed, 0.005)], 1);
+    let mut faulty = FaultyAmplifier::new(port, &[fault(FaultTarget::Drive, FaultMode::Delayed, 0.005)], 1);
     faulty.command(DriveCommand::off(1, at(100)), at(19));
     faulty.command(DriveCommand::off(2, at(100)), at(24));
     assert_eq!(*log.lock().unwrap(), [1, 2]);
@@ -107,7 +107,7 @@ fn commands_that_are_due_together_arrive_in_their_order() {
         state: |_: Nanos| Err(NoData::NeverRead),
         command: move |command: DriveCommand, _: Nanos| into.lock().unwrap().push(command.sequence()),
     };
-    let mut faulty = FaultyAmplifier::new(port, &[always(Target::Drive, FaultMode::Delayed, 0.01)], 1);
+    let mut faulty = FaultyAmplifier::new(port, &[always(FaultTarget::Drive, FaultMode::Delayed, 0.01)], 1);
     for burst in 0..100 {
         for count in 0..5 {
             faulty.command(
@@ -131,7 +131,7 @@ fn a_stage_is_told_what_the_loop_tells_it() {
             into.lock().unwrap().push((command.sequence(), now))
         },
     };
-    let mut faulty = FaultyStage::new(port, &[always(Target::Stage, FaultMode::Off, 0.0)], 1);
+    let mut faulty = FaultyStage::new(port, &[always(FaultTarget::Stage, FaultMode::Off, 0.0)], 1);
     faulty.command(StageCommand::stop(7, at(10)), at(3));
     assert_eq!(*log.lock().unwrap(), [(7, at(3))]);
 }

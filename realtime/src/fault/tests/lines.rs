@@ -18,7 +18,7 @@ fn shown(faults: &[Fault], seed: u64, cycles: u64) -> Vec<Forces> {
 
 /// The lateral axis alone.
 fn lateral(mode: FaultMode, strength: f64, cycles: u64) -> Vec<Channel> {
-    let shown = shown(&[fault(Target::Lateral, mode, strength)], 1, cycles);
+    let shown = shown(&[fault(FaultTarget::Lateral, mode, strength)], 1, cycles);
     shown.into_iter().map(|forces| forces.lateral).collect()
 }
 
@@ -37,7 +37,7 @@ fn a_fault_acts_from_its_begin_to_just_before_its_end() {
     is(FaultMode::Invalid, 0.0, |_| Err(NoData::Invalid));
     is(FaultMode::Corrupt, 0.0, |_| Err(NoData::Corrupt));
     is(FaultMode::Disconnected, 0.0, |_| Err(NoData::Disconnected));
-    let acts = |now| fault(Target::Force, FaultMode::Off, 0.0).acts(Nanos(now));
+    let acts = |now| fault(FaultTarget::Force, FaultMode::Off, 0.0).acts(Nanos(now));
     assert_eq!([10 * T - 1, 10 * T, 20 * T - 1, 20 * T].map(acts), [false, true, true, false]);
 }
 
@@ -49,17 +49,17 @@ fn a_fault_is_on_its_channel_alone() {
         let differ = |axis: fn(&Forces) -> Channel| shown.iter().zip(&sound).any(|(a, b)| axis(a) != axis(b));
         (differ(|forces| forces.lateral), differ(|forces| forces.normal))
     };
-    assert_eq!(hit(Target::Lateral), (true, false));
-    assert_eq!(hit(Target::Normal), (false, true));
-    assert_eq!(hit(Target::Force), (true, true));
-    for other in [Target::Amplifier, Target::Drive, Target::Stage] {
+    assert_eq!(hit(FaultTarget::Lateral), (true, false));
+    assert_eq!(hit(FaultTarget::Normal), (false, true));
+    assert_eq!(hit(FaultTarget::Force), (true, true));
+    for other in [FaultTarget::Amplifier, FaultTarget::Drive, FaultTarget::Stage] {
         assert_eq!(hit(other), (false, false), "{other:?}");
     }
 }
 
 #[test]
 fn several_faults_act_together() {
-    let wrong = fault(Target::Lateral, FaultMode::Wrong, 2.0);
+    let wrong = fault(FaultTarget::Lateral, FaultMode::Wrong, 2.0);
     for cycle in ACTS {
         let shown = shown(&[wrong; FAULTS], 1, 30)[cycle as usize].lateral.unwrap();
         assert_eq!(shown.value, nth(cycle).value * 16.0);
@@ -69,7 +69,7 @@ fn several_faults_act_together() {
 #[test]
 fn off_is_silence() {
     is(FaultMode::Off, 0.0, |_| Ok(nth(9)));
-    let never = shown(&[always(Target::Force, FaultMode::Off, 0.0)], 1, 3);
+    let never = shown(&[always(FaultTarget::Force, FaultMode::Off, 0.0)], 1, 3);
     assert_eq!(never, [Forces::missing(NoData::NeverRead); 3], "silent from the beginning");
 }
 
@@ -78,7 +78,7 @@ fn stuck_stands_still_while_counters_and_clocks_go_on() {
     let held = |cycle, since| Ok(Sample { value: nth(since).value, raw: nth(since).raw, ..nth(cycle) });
     is(FaultMode::Stuck, 0.0, |cycle| held(cycle, 10));
     // A second time it stands where it is then, not where it stood before.
-    let first = fault(Target::Lateral, FaultMode::Stuck, 0.0);
+    let first = fault(FaultTarget::Lateral, FaultMode::Stuck, 0.0);
     let again = Fault { from: at(30), until: at(40), ..first };
     let shown = shown(&[first, again], 1, 40);
     assert!((30..40).all(|cycle| shown[cycle as usize].lateral == held(cycle, 30)));
@@ -96,7 +96,7 @@ fn what_is_missing_stays_missing_under_a_fault() {
             },
             command: (),
         };
-        let now = Fault { from: at(5), ..always(Target::Lateral, mode, 1.0) };
+        let now = Fault { from: at(5), ..always(FaultTarget::Lateral, mode, 1.0) };
         let mut faulty = FaultyForce::new(sensor, &[now], 1);
         let shown: Vec<Channel> = (0..10).map(|cycle| faulty.read(at(cycle)).lateral).collect();
         let expected = match mode {
@@ -117,7 +117,7 @@ fn what_is_missing_stays_missing_under_a_fault() {
 #[test]
 fn garbage_is_anything_and_keeps_count_and_time() {
     let cycles = 8000;
-    let shown = shown(&[always(Target::Lateral, FaultMode::Garbage, 0.0)], 3, cycles);
+    let shown = shown(&[always(FaultTarget::Lateral, FaultMode::Garbage, 0.0)], 3, cycles);
     let readings: Vec<Sample> = shown.iter().map(|forces| forces.lateral.unwrap()).collect();
     for (cycle, reading) in (0..).zip(&readings) {
         assert_eq!((reading.sequence, reading.taken_at), (nth(cycle).sequence, nth(cycle).taken_at));
@@ -160,7 +160,7 @@ fn slow_is_one_sample_in_so_many() {
 fn delayed_is_what_had_come_so_long_before() {
     is(FaultMode::Delayed, 0.005, |cycle| Ok(nth(cycle - 5)));
     // The line is a ring: all the same when it has gone round.
-    let late = always(Target::Lateral, FaultMode::Delayed, 0.1);
+    let late = always(FaultTarget::Lateral, FaultMode::Delayed, 0.1);
     for (cycle, forces) in (0..).zip(shown(&[late], 1, 1000)) {
         let expected = if cycle < 100 { Err(NoData::NeverRead) } else { Ok(nth(cycle - 100)) };
         assert_eq!(forces.lateral, expected, "cycle {cycle}");
@@ -170,7 +170,7 @@ fn delayed_is_what_had_come_so_long_before() {
 #[test]
 fn intermittent_loses_its_share_the_same_from_the_same_seed() {
     for share in [0.1, 0.3, 0.9] {
-        let lossy = always(Target::Lateral, FaultMode::Intermittent, share);
+        let lossy = always(FaultTarget::Lateral, FaultMode::Intermittent, share);
         let run = |seed| shown(&[lossy], seed, 4001);
         let mut last = 0;
         let mut lost = 0;
@@ -212,7 +212,7 @@ fn saturated_says_so() {
 fn disordered_is_every_other_sample_three_old_with_its_old_stamp() {
     is(FaultMode::Disordered, 0.0, |cycle| Ok(nth(if cycle % 2 == 0 { cycle - 3 } else { cycle })));
     // Round the ring as well; of the first samples there is none that is three old.
-    let mixed = always(Target::Lateral, FaultMode::Disordered, 0.0);
+    let mixed = always(FaultTarget::Lateral, FaultMode::Disordered, 0.0);
     for (cycle, forces) in (0..).zip(shown(&[mixed], 1, 600)) {
         let expected = match cycle {
             0 | 2 => Err(NoData::NeverRead),
@@ -243,7 +243,7 @@ fn a_lost_sample_stays_lost_until_the_next() {
             },
             command: (),
         };
-        let mut faulty = FaultyForce::new(sensor, &[always(Target::Lateral, mode, strength)], 2);
+        let mut faulty = FaultyForce::new(sensor, &[always(FaultTarget::Lateral, mode, strength)], 2);
         (0..400).map(move |cycle| faulty.read(at(cycle)).lateral).collect::<Vec<Channel>>()
     };
     for (mode, strength) in [
@@ -269,7 +269,7 @@ fn a_delay_goes_on_between_samples() {
         state: |now: Nanos| Forces { lateral: Ok(nth(now.0 / T / 5)), normal: Err(NoData::NotFitted) },
         command: (),
     };
-    let mut faulty = FaultyForce::new(sensor, &[always(Target::Lateral, FaultMode::Delayed, 0.003)], 2);
+    let mut faulty = FaultyForce::new(sensor, &[always(FaultTarget::Lateral, FaultMode::Delayed, 0.003)], 2);
     for cycle in 0..100 {
         let shown = faulty.read(at(cycle)).lateral;
         assert_eq!(

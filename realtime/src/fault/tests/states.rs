@@ -1,7 +1,7 @@
 //! States of the amplifier and of the stage on a faulty line.
 
 use super::*;
-use models::quantity::PeakToPeak;
+use models::PeakToPeak;
 
 /// The amplifier's state of a cycle: everything in it is of that cycle.
 fn amplifier(cycle: u64) -> AmplifierState {
@@ -44,23 +44,23 @@ fn stages(fault: Fault, cycles: u64) -> Vec<Result<StageState, NoData>> {
 
 #[track_caller]
 fn amplifier_is(mode: FaultMode, strength: f64, during: impl Fn(u64) -> AmplifierState) {
-    for (cycle, state) in (0..).zip(amplifiers(fault(Target::Amplifier, mode, strength), 30)) {
+    for (cycle, state) in (0..).zip(amplifiers(fault(FaultTarget::Amplifier, mode, strength), 30)) {
         let expected = if ACTS.contains(&cycle) { during(cycle) } else { amplifier(cycle) };
         assert_eq!(state, Ok(expected), "{mode:?} in cycle {cycle}");
     }
     // Faults of other channels, the way of the commands included, leave the states alone.
-    for other in [Target::Force, Target::Drive, Target::Stage] {
+    for other in [FaultTarget::Force, FaultTarget::Drive, FaultTarget::Stage] {
         assert_eq!(amplifiers(fault(other, mode, strength), 30)[15], Ok(amplifier(15)));
     }
 }
 
 #[track_caller]
 fn stage_is(mode: FaultMode, strength: f64, during: impl Fn(u64) -> StageState) {
-    for (cycle, state) in (0..).zip(stages(fault(Target::Stage, mode, strength), 30)) {
+    for (cycle, state) in (0..).zip(stages(fault(FaultTarget::Stage, mode, strength), 30)) {
         let expected = if ACTS.contains(&cycle) { during(cycle) } else { stage(cycle) };
         assert_eq!(state, Ok(expected), "{mode:?} in cycle {cycle}");
     }
-    for other in [Target::Force, Target::Drive, Target::Amplifier] {
+    for other in [FaultTarget::Force, FaultTarget::Drive, FaultTarget::Amplifier] {
         assert_eq!(stages(fault(other, mode, strength), 30)[15], Ok(stage(15)));
     }
 }
@@ -143,7 +143,7 @@ fn is_garbage(name: &str, values: impl Iterator<Item = f64>, range: f64) {
 #[test]
 fn garbage_spoils_every_number_of_a_state() {
     const CYCLES: u64 = 4000;
-    let amplifiers = amplifiers(always(Target::Amplifier, FaultMode::Garbage, 0.0), CYCLES);
+    let amplifiers = amplifiers(always(FaultTarget::Amplifier, FaultMode::Garbage, 0.0), CYCLES);
     let all = || amplifiers.iter().map(|state| state.as_ref().unwrap());
     is_garbage("amplitude", all().map(|state| state.amplitude.unwrap().value), 200e-6);
     is_garbage("frequency", all().map(|state| state.echoed_frequency_hz), 200e3);
@@ -153,7 +153,7 @@ fn garbage_spoils_every_number_of_a_state() {
         all().zip(0..).all(|(state, cycle)| (state.sequence, state.taken_at) == (cycle as u32, at(cycle)))
     );
 
-    let stages = stages(always(Target::Stage, FaultMode::Garbage, 0.0), CYCLES);
+    let stages = stages(always(FaultTarget::Stage, FaultMode::Garbage, 0.0), CYCLES);
     let all = || stages.iter().map(|state| state.as_ref().unwrap());
     is_garbage("position", all().map(|state| state.position_m), 2.0);
     is_garbage("velocity", all().map(|state| state.velocity_m_s), 2.0);

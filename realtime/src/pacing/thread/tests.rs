@@ -9,8 +9,7 @@ use crate::ports::{
     Amplifier, AmplifierState, ForceSensor, Forces, NoData, Quality, Sample, Stage, StageState,
 };
 use crate::safety::{Cause, Limits, Request};
-use models::prediction::SpringSlider;
-use models::quantity::PeakToPeak;
+use models::{PeakToPeak, SpringSlider};
 use ringbuf::HeapRb;
 use ringbuf::traits::{Consumer, Observer, Split};
 use std::sync::Mutex;

@@ -244,7 +244,7 @@ fn faulted_without_supply(s: &mut Observation) {
 #[test]
 fn a_supply_cut_for_a_silent_board_before_arming_is_proved_and_the_fault_it_explains_is_not_waited_for() {
     let closed = |s: &mut Observation, at: u64| {
-        let contact = Contact { closed: true, taken_at: Nanos(at * T.0), sequence: at as u32 };
+        let contact = SafetyContact { closed: true, taken_at: Nanos(at * T.0), sequence: at as u32 };
         s.contacts.emergency_stop = Ok(contact);
     };
     let mut rig = Relayed::new(3, None);
@@ -284,7 +284,7 @@ fn a_supply_cut_for_a_pressed_stop_or_a_refusal_waits_for_a_person() {
         let mut rig = Relayed::new(1, None);
         let seen = |s: &mut Observation, is_closed: bool, on: bool| {
             let taken_at = s.supply.unwrap().taken_at;
-            s.contacts.emergency_stop = Ok(Contact { closed: is_closed, taken_at, sequence: 1 });
+            s.contacts.emergency_stop = Ok(SafetyContact { closed: is_closed, taken_at, sequence: 1 });
             faulted_without_supply(s);
             s.amplifier.as_mut().unwrap().output_on = on;
         };

@@ -22,7 +22,7 @@ impl Guarded {
     fn cycle(&mut self, spoil: impl FnOnce(&mut Observation), controls: Controls) -> Decision {
         let n = self.bench.n + 1;
         let taken_at = Nanos(u64::from(n) * T.0);
-        let contact = |closed| Ok(Contact { closed, taken_at, sequence: n });
+        let contact = |closed| Ok(SafetyContact { closed, taken_at, sequence: n });
         let (held, pressed, open, cut) = (self.held, self.pressed, self.open, self.cut);
         let decision = self.bench.cycle(
             |s| {
@@ -102,7 +102,7 @@ fn letting_go_pressing_stop_and_opening_the_guard_switch_off_at_once() {
 
 #[test]
 fn a_contact_of_which_nothing_is_known_is_open() {
-    type Pick = fn(&mut Observation) -> &mut Result<Contact, NoData>;
+    type Pick = fn(&mut Observation) -> &mut Result<SafetyContact, NoData>;
     let picks: [(Pick, Cause); 3] = [
         (|s| &mut s.contacts.dead_man, Cause::DeadMan),
         (|s| &mut s.contacts.emergency_stop, Cause::EmergencyStop),

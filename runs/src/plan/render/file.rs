@@ -4,7 +4,7 @@ use super::{MOST, RenderPlan};
 use crate::input::{BadInput, text_of};
 use crate::plan::{Plan, Series};
 use crate::run_dir::sha256_of;
-use models::target::Target;
+use models::Target;
 use std::path::{Path, PathBuf};
 
 /// Bytes of an image at most.

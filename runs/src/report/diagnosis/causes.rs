@@ -5,10 +5,10 @@ use super::mechanism::drawing;
 use super::overlay::Overlay;
 use crate::report::html::{bar, cell, columns, escape, numeric, row, table};
 use crate::verdict_text::{EXPLAINED, aliases, estimate, name};
-use diagnosis::format::plain;
-use diagnosis::format::probability;
-use diagnosis::intervals::Estimate;
-use diagnosis::verdict::{Diagnosis, Hypothesis};
+use diagnosis::report::format::plain;
+use diagnosis::report::format::probability;
+use diagnosis::report::intervals::Estimate;
+use diagnosis::{Diagnosis, Hypothesis};
 
 /// Probability from which a hypothesis is listed.
 const LISTED: f64 = 0.002;

@@ -1,10 +1,10 @@
 //! The gap over the operating space as tables of cells: read without colour, by a screen reader and in print.
 //! Every pass is a mark in its cell, and leads to the numbers of the pass.
 
-use crate::human::{number, titled};
+use crate::format::{number, titled};
 use crate::report::html::{column, escape, note, row, table};
 use crate::report::plots::ends;
-use diagnosis::data::Table;
+use diagnosis::Table;
 use models::covariate::{self, Covariate};
 
 /// Cells along an axis at most.

@@ -2,14 +2,13 @@
 //! as the table has it, and by the library's law alone.
 
 use super::overlay::Overlay;
-use crate::human::{settings, titled};
+use crate::format::{settings, titled};
 use crate::report::html::{escape, note};
 use crate::report::plots::verdict::{LawPass, law};
-use crate::report::plots::{Span, ends};
-use diagnosis::format::plain;
-use diagnosis::predict::Forecast;
-use diagnosis::verdict::Hypothesis;
-use models::condition::Condition;
+use crate::report::plots::{AxisRange, ends};
+use diagnosis::report::format::plain;
+use diagnosis::{Forecast, Hypothesis};
+use models::Condition;
 use models::covariate::{self, Covariate, Scale};
 
 const PLACES: usize = 60;
@@ -34,7 +33,7 @@ impl Overlay<'_> {
         let axis = |c: &'static Covariate| {
             let seen: Vec<f64> = passes.iter().map(|p| c.of(p)).collect::<Option<_>>()?;
             let [low, high] = ends(seen);
-            let span = Span::over([low, high].into_iter(), c.scale == Scale::Log && low > 0.0);
+            let span = AxisRange::over([low, high].into_iter(), c.scale == Scale::Log && low > 0.0);
             let within = |v: f64| v.clamp(low, high);
             (high - low > 1e-3 * high.abs()).then(|| (c, span.places(PLACES as u32).map(within).collect()))
         };
@@ -82,7 +81,7 @@ impl Overlay<'_> {
         let name = plain(&h.effects.join(" + "));
         let form = |(i, v): (usize, &f64)| (x(*v), adds(k * PLACES + i, |f| f.form));
         let alone: Vec<(f64, f64)> = places.iter().enumerate().map(form).collect();
-        let span = Span::over(curve.iter().map(|(x, ..)| *x), along.scale == Scale::Log);
+        let span = AxisRange::over(curve.iter().map(|(x, ..)| *x), along.scale == Scale::Log);
         Ok(law(&name, (&titled(along), span), &marks, &curve, &alone)?
             + &note(&format!(
                 "What {} adds to the recalibrated baseline along the {}, at {}. Line: as the table has it, with its \

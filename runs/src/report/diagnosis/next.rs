@@ -1,10 +1,10 @@
 //! What to measure next, in physical words, with the plan beside it.
 
-use crate::human::{number, titled};
+use crate::format::{number, titled};
 use crate::report::html::{column, escape, numeric, table};
-use diagnosis::next::Experiment;
-use diagnosis::verdict::Diagnosis;
-use models::condition::Condition;
+use diagnosis::Diagnosis;
+use diagnosis::report::next::Experiment;
+use models::Condition;
 use models::covariate::{self, Covariate};
 
 /// The section.

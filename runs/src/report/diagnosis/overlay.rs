@@ -1,14 +1,12 @@
 //! What was measured, and what the models say of it.
 
-use crate::human::{settings, titled};
+use crate::format::{settings, titled};
 use crate::report::html::note;
 use crate::report::levels::{FORCE, FREQUENCY, Levels, PRESSURE, SPEED};
 use crate::report::plots::verdict::{Seen, overlay, parity};
-use crate::report::plots::{Span, mu_axis};
-use diagnosis::data::Table;
-use diagnosis::predict::Forecast;
-use diagnosis::verdict::Diagnosis;
-use models::condition::Condition;
+use crate::report::plots::{AxisRange, mu_axis};
+use diagnosis::{Diagnosis, Forecast, Table};
+use models::Condition;
 use models::covariate::{self, Covariate};
 
 /// Panels that stand side by side.
@@ -134,7 +132,7 @@ impl<'a> Overlay<'a> {
         let x = &covariate::AMPLITUDE;
         let passes = &self.table.passes;
         let shown = |i: usize| x.shown.0 * x.of(&passes[i]).unwrap_or(0.0);
-        let span = Span::from_zero(rows.iter().map(|&i| shown(i)));
+        let span = AxisRange::from_zero(rows.iter().map(|&i| shown(i)));
         let typical = passes[rows[rows.len() / 2]];
         let places: Vec<f64> = span.places(PLACES).collect();
         let at = |place: &f64| {

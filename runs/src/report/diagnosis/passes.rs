@@ -1,10 +1,9 @@
 //! Every pass of a table with its numbers: where the marks of the maps lead.
 
 use super::overlay::Overlay;
-use crate::human::titled;
+use crate::format::titled;
 use crate::report::html::{column, columns, table};
-use diagnosis::data::Table;
-use diagnosis::predict::Forecast;
+use diagnosis::{Forecast, Table};
 use models::covariate::{self, Covariate};
 use std::fmt::Write;
 

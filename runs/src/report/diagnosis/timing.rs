@@ -1,11 +1,11 @@
 //! What the edges in the run's record say of time: a sentence, the mean edge, and the numbers.
 
-use crate::human::number;
+use crate::format::number;
 use crate::report::html::{columns, escape, note, numeric, row, table};
 use crate::report::plots::verdict::edge;
-use diagnosis::format::probability;
-use diagnosis::timing::{Comparison, Form, FormNote, title};
-use diagnosis::verdict::Diagnosis;
+use diagnosis::Diagnosis;
+use diagnosis::report::format::probability;
+use diagnosis::report::timing::{Comparison, FormNote, ResponseForm, title};
 
 /// The section; empty for a table without a record.
 pub fn section(result: &Diagnosis) -> miette::Result<String> {
@@ -40,10 +40,10 @@ pub fn section(result: &Diagnosis) -> miette::Result<String> {
     Ok(text)
 }
 
-fn form(form: Form) -> &'static str {
+fn form(form: ResponseForm) -> &'static str {
     match form {
-        Form::Delay => "delay (shift in time)",
-        Form::FirstOrder => "lag of first order",
-        Form::SecondOrder => "lag of second order",
+        ResponseForm::Delay => "delay (shift in time)",
+        ResponseForm::FirstOrder => "lag of first order",
+        ResponseForm::SecondOrder => "lag of second order",
     }
 }

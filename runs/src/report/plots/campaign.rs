@@ -1,9 +1,10 @@
 //! The figures of a campaign.
 
 use super::{
-    COLOURS, GREY, PANEL, Span, WIDE, band, draw, edge_of, eq_20, figure, filled, line, mark, measured, mu_on,
+    AxisRange, COLOURS, GREY, PANEL, WIDE, band, draw, edge_of, eq_20, figure, filled, line, mark, measured,
+    mu_on,
 };
-use models::reading::Reading;
+use models::Reading;
 
 /// What one cell, or one model of it, puts into a figure.
 #[derive(Default)]
@@ -22,7 +23,7 @@ const MU: [f64; 2] = [0.0, 1.15];
 pub fn against(axis: &str, logarithmic: bool, all: &[Series]) -> miette::Result<String> {
     let places = || all.iter().flat_map(|s| s.points.iter().map(|p| p.0));
     let alt = format!("Relative friction against {axis}: {} cells, measured and predicted.", all.len());
-    figure(PANEL, (Span::over(places(), logarithmic), axis), mu_on(MU), &alt, |chart, size| {
+    figure(PANEL, (AxisRange::over(places(), logarithmic), axis), mu_on(MU), &alt, |chart, size| {
         for (i, series) in all.iter().enumerate() {
             let colour = COLOURS[i % COLOURS.len()];
             let edge = |k: f64| edge_of(&series.slider, k, MU);
@@ -39,7 +40,7 @@ pub fn against(axis: &str, logarithmic: bool, all: &[Series]) -> miette::Result<
 pub fn against_psi(all: &[(String, Vec<(f64, f64)>)]) -> miette::Result<String> {
     let places = || all.iter().flat_map(|(_, points)| points.iter().map(|p| p.0));
     let (low, high) = (places().fold(0.1, f64::min) * 0.8, places().fold(10.0, f64::max) * 1.2);
-    let x = (Span::logarithmic(low..high), "\u{3a8} of Eq. 17");
+    let x = (AxisRange::logarithmic(low..high), "\u{3a8} of Eq. 17");
     let alt = "Relative friction against Psi, all passes of all cells, with Eq. 20.";
     figure(WIDE, x, mu_on(MU), alt, |chart, size| {
         let law = |star: f64| eq_20(low, high, star);

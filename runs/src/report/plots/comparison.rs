@@ -1,8 +1,8 @@
 //! The figures of two runs and of more.
 
 use super::{
-    AMPLITUDE, COLOURS, GREY, SERIES, Span, WIDE, band, beyond, capital, figure, line, mark_name, measured,
-    mu_axis, mu_on, series_key,
+    AMPLITUDE, AxisRange, COLOURS, GREY, SERIES, WIDE, band, beyond, capital, figure, line, mark_name,
+    measured, mu_axis, mu_on, series_key,
 };
 use crate::compare::groups::{GroupDifference, Grouped};
 use crate::compare::{Comparison, Mean, Paired};
@@ -18,7 +18,7 @@ pub fn overlay(result: &Comparison) -> miette::Result<String> {
         "Relative friction of two runs against amplitude, {} conditions in common: {one} the first, {other} the second.",
         result.pairs.len()
     );
-    let x = (Span::linear(0.0..widest), AMPLITUDE);
+    let x = (AxisRange::linear(0.0..widest), AMPLITUDE);
     // A little beside each other, so that no mark hides the other one.
     let place =
         |p: &Paired, m: Mean, aside: f64| (p.amplitude_pp_m * 1e6 + aside * widest, m.mu_relative, m.sd);
@@ -62,7 +62,7 @@ pub fn differences(result: &Comparison) -> miette::Result<String> {
         "Difference of relative friction, second run less first, against amplitude: {} conditions, by {name}.",
         result.pairs.len()
     );
-    let (x, y) = (Span::linear(0.0..widest), Span::linear(low..high));
+    let (x, y) = (AxisRange::linear(0.0..widest), AxisRange::linear(low..high));
     let (x, y) = ((x, AMPLITUDE), (y, "difference of \u{3bc}', second less first"));
     let level_of = |p: &Paired| levels.index(of(p)).min(SERIES - 1);
     let along = |value: f64| vec![(0.0, value), (widest, value)];
@@ -142,7 +142,7 @@ fn by_group(
     let span = if from == 0 { mu_axis(ends) } else { about_zero(ends) };
     let alt =
         format!("{shown} against amplitude, {} marks of {} groups.", all().count(), points.len() - from);
-    let (x, y) = ((Span::linear(0.0..widest), AMPLITUDE), (Span::linear(span[0]..span[1]), axis));
+    let (x, y) = ((AxisRange::linear(0.0..widest), AMPLITUDE), (AxisRange::linear(span[0]..span[1]), axis));
     let svg = figure(WIDE, x, y, &alt, |chart, size| {
         if from > 0 {
             line(chart, vec![(0.0, 0.0), (widest, 0.0)], GREY, Some(4))?;

@@ -1,18 +1,19 @@
 //! The figures of a rendered target.
 
-use super::{COLOURS, GREY, PANEL, Span, WIDE, band, figure, line, measured, series_key};
-use crate::fidelity::{Group, Place};
-use crate::human::number;
+use super::{AxisRange, COLOURS, GREY, PANEL, WIDE, band, figure, line, measured, series_key};
+use crate::fidelity::{Group, PlaceMeans};
+use crate::format::number;
 
 /// Wanted and measured `mu'` over position, one direction of one group.
-pub fn over_position(places: &[Place], what: &str) -> miette::Result<String> {
-    let of =
-        |mu: fn(&Place) -> f64| -> Vec<(f64, f64)> { places.iter().map(|p| (p.x_m * 1e3, mu(p))).collect() };
+pub fn over_position(places: &[PlaceMeans], what: &str) -> miette::Result<String> {
+    let of = |mu: fn(&PlaceMeans) -> f64| -> Vec<(f64, f64)> {
+        places.iter().map(|p| (p.x_m * 1e3, mu(p))).collect()
+    };
     let edges = [of(|p| p.measured - 2.0 * p.measured_sd), of(|p| p.measured + 2.0 * p.measured_sd)];
     let values = edges.iter().flatten().map(|p| p.1).chain(places.iter().map(|p| p.wanted));
     let alt = format!("Wanted, predicted and measured relative friction over position, {what}.");
-    let x = (Span::over(places.iter().map(|p| p.x_m * 1e3), false), "position, mm");
-    let y = (Span::over(values, false), "relative friction \u{3bc}'");
+    let x = (AxisRange::over(places.iter().map(|p| p.x_m * 1e3), false), "position, mm");
+    let y = (AxisRange::over(values, false), "relative friction \u{3bc}'");
     figure(PANEL, x, y, &alt, |chart, _| {
         band(chart, &edges[0], &edges[1], COLOURS[0])?;
         line(chart, of(|p| p.wanted), GREY, None)?;
@@ -27,9 +28,9 @@ pub fn transfer(groups: &[Group]) -> miette::Result<String> {
     if bins().next().is_none() {
         return Ok(String::new());
     }
-    let places = Span::over(bins().map(|b| b.hz), true);
+    let places = AxisRange::over(bins().map(|b| b.hz), true);
     let highest = bins().map(|b| b.gain + 2.0 * b.gain_sd).fold(1.1, f64::max).min(3.0);
-    let y = (Span::linear(0.0..highest), "measured over wanted \u{3bc}'");
+    let y = (AxisRange::linear(0.0..highest), "measured over wanted \u{3bc}'");
     let alt = "Gain from wanted to measured relative friction against frequency, with the known dynamics.";
     figure(WIDE, (places, "temporal frequency, Hz"), y, alt, |chart, size| {
         if let Some(known) = groups.iter().find_map(|g| g.known) {

@@ -2,19 +2,17 @@
 //! published of the same, and Eq. 20 with their `Psi*` at the conditions of the passes.
 
 use super::{
-    AMPLITUDE, COLOURS, GREY, PANEL, Span, band, beyond, capital, draw, figure, line, mark, mark_name,
+    AMPLITUDE, AxisRange, COLOURS, GREY, PANEL, band, beyond, capital, draw, figure, line, mark, mark_name,
     measured, mu_axis, mu_on,
 };
-use crate::human::{number, settings};
+use crate::format::{number, settings};
 use crate::report::html::escape;
 use crate::report::levels::{FORCE, FREQUENCY, Levels, PRESSURE, SPEED};
 use crate::report::published::Published;
-use crate::run_data::RunData;
-use crate::sequence::MeasuredPass;
-use models::condition::Condition;
+use crate::{MeasuredPass, RunData};
 use models::covariate::{self, Covariate};
 use models::psi::{PsiEq17, relative_friction, within_fitted_range};
-use models::quantity::PeakToPeak;
+use models::{Condition, PeakToPeak};
 use plotters::prelude::*;
 use std::collections::BTreeMap;
 
@@ -108,7 +106,7 @@ fn panel(
         all.iter().filter_map(|p| Some((p, scale * (axis.published)(p)?, p.mu_relative?))).collect();
     let papers = axis.papers.map(|v| scale * v).into_iter().filter(|_| !laws.is_empty());
     let xs = || own.iter().map(|p| p.0).chain(values.iter().map(|v| v.1)).chain(papers.clone());
-    let span = if k == 0 { Span::from_zero(xs()) } else { Span::over(xs(), true) };
+    let span = if k == 0 { AxisRange::from_zero(xs()) } else { AxisRange::over(xs(), true) };
     let ys = mu_axis(own.iter().map(|p| p.1).chain(values.iter().map(|v| v.2)));
     let mut sources: Vec<String> = Vec::new();
     for (p, ..) in &values {
@@ -170,15 +168,31 @@ fn panel(
         }
         Ok(())
     })?;
+    let words = caption(k, passes, &base, &sources, &laws, mu0, all);
+    let cut = beyond(own.iter().map(|p| p.1).chain(values.iter().map(|v| v.2)), ys);
+    Ok(format!("<figure>{svg}<figcaption>{}{cut}</figcaption></figure>", escape(&words)))
+}
+
+/// What the marks and lines of a panel stand for.
+fn caption(
+    k: usize,
+    passes: usize,
+    base: &Condition,
+    sources: &[String],
+    laws: &[&Published],
+    mu0: Option<f64>,
+    all: &[Published],
+) -> String {
+    let axis = &AXES[k];
     let others = AXES.iter().map(|a| a.covariate).filter(|c| c.name != axis.covariate.name);
-    let mut words = format!("Discs: {} passes of this run at {}.", own.len(), settings(others, &base));
+    let mut words = format!("Discs: {passes} passes of this run at {}.", settings(others, base));
     for (i, source) in sources.iter().enumerate() {
         words += &format!(" {}: {source}.", capital(mark_name((1 + i) % 5)));
     }
     if !sources.is_empty() {
         words += " Hollow where the source states other conditions.";
     }
-    for law in &laws {
+    for law in laws {
         let sd = law.psi_star_sd.map_or(String::new(), |sd| format!(" \u{b1} {}", number(sd)));
         let mu0 = number(mu0.unwrap_or(f64::NAN));
         let star = number(law.psi_star.unwrap_or(f64::NAN));
@@ -194,6 +208,5 @@ fn panel(
     if mu0.is_none() && all.iter().any(|p| p.psi_star.is_some()) {
         words += " Eq. 20 is not drawn: the run has no pass without vibration, so its \u{3bc}0 is not known.";
     }
-    let cut = beyond(own.iter().map(|p| p.1).chain(values.iter().map(|v| v.2)), ys);
-    Ok(format!("<figure>{svg}<figcaption>{}{cut}</figcaption></figure>", escape(&words)))
+    words
 }

@@ -1,18 +1,15 @@
 //! The figures of a run.
 
 use super::{
-    AMPLITUDE, COLOURS, GREY, Span, WIDE, band, beyond, draw, edge_of, eq_20, figure, line, mark, measured,
-    mu_axis, mu_on, series_key, wrong,
+    AMPLITUDE, AxisRange, COLOURS, GREY, WIDE, band, beyond, draw, edge_of, eq_20, figure, line, mark,
+    measured, mu_axis, mu_on, series_key, wrong,
 };
 use crate::ambient::{air_set, one_air, shown};
-use crate::human::number;
+use crate::format::number;
 use crate::report::html::escape;
 use crate::report::levels::{FORCE, FREQUENCY, Levels, SPEED};
-use crate::run_data::RunData;
-use crate::sequence::MeasuredPass;
-use models::condition::Condition;
-use models::prediction::{FrictionModel, SpringSlider};
-use models::quantity::PeakToPeak;
+use crate::{MeasuredPass, RunData};
+use models::{Condition, FrictionModel, PeakToPeak, SpringSlider};
 use plotters::prelude::*;
 use realtime::pacing::LoopReport;
 
@@ -63,7 +60,7 @@ pub fn mu_against_amplitude(run: &RunData) -> miette::Result<String> {
         chosen.len(),
         speeds.count()
     );
-    let x = (Span::linear(0.0..widest), AMPLITUDE);
+    let x = (AxisRange::linear(0.0..widest), AMPLITUDE);
     let svg = figure(WIDE, x, mu_on(axis), &alt, |chart, size| {
         for i in 0..speeds.count() {
             let colour = COLOURS[i % COLOURS.len()];
@@ -123,7 +120,7 @@ pub fn mu_against_psi(run: &RunData) -> miette::Result<String> {
         "Relative friction against Psi from {lowest:.2} to {highest:.1}: {} passes and the curve of Eq. 20 with the run's Psi*.",
         points.len()
     );
-    let x = (Span::logarithmic(lowest..highest), "\u{3a8} of Eq. 17");
+    let x = (AxisRange::logarithmic(lowest..highest), "\u{3a8} of Eq. 17");
     let svg = figure(WIDE, x, mu_on(axis), &alt, |chart, size| {
         let law = |star: f64| eq_20(lowest, highest, star);
         if let Some(found) = run.summary.as_ref().and_then(|s| s.psi_star) {
@@ -152,7 +149,7 @@ pub fn residuals(run: &RunData) -> miette::Result<String> {
     let (passes, largest) = (points.len(), number(worst));
     let alt =
         format!("Surprise of {passes} passes against time, the largest of {largest} standard deviations.");
-    let (x, y) = (Span::linear(0.0..end), Span::linear(-most..most));
+    let (x, y) = (AxisRange::linear(0.0..end), AxisRange::linear(-most..most));
     let (x, y) = ((x, "time, s"), (y, "surprise, standard deviations"));
     let svg = figure((WIDE.0, 340), x, y, &alt, |chart, size| {
         for level in [-1.96, 1.96] {
@@ -179,7 +176,7 @@ pub fn lateness(report: &LoopReport) -> miette::Result<String> {
     }
     let highest = bars.iter().map(|b| b.0).fold(10.0, f64::max) * 2.0;
     let most = bars.iter().map(|b| b.1).fold(10.0, f64::max) * 2.0;
-    let (x, y) = (Span::logarithmic(0.5..highest), Span::logarithmic(0.7..most));
+    let (x, y) = (AxisRange::logarithmic(0.5..highest), AxisRange::logarithmic(0.7..most));
     let (x, y) = ((x, "lateness, \u{b5}s"), (y, "deadlines"));
     let alt = "Histogram of the lateness of the loop's cycles; the figures below say the same.";
     let svg = figure((WIDE.0, 300), x, y, alt, |chart, _| {
@@ -195,7 +192,7 @@ pub fn lateness(report: &LoopReport) -> miette::Result<String> {
 mod tests {
     use super::*;
     use crate::ambient::{Level, Source};
-    use models::pass::Pass;
+    use models::Pass;
 
     fn run(passes: Vec<MeasuredPass>) -> RunData {
         RunData {

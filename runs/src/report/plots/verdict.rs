@@ -1,9 +1,10 @@
 //! The figures of a verdict.
 
 use super::{
-    COLOURS, GREY, PANEL, Span, band, beyond, draw, edge_of, figure, line, mark, measured, mu_axis, mu_on,
+    AxisRange, COLOURS, GREY, PANEL, band, beyond, draw, edge_of, figure, line, mark, measured, mu_axis,
+    mu_on,
 };
-use crate::human::titled;
+use crate::format::titled;
 use crate::report::html::escape;
 use models::covariate::{Covariate, Scale};
 use plotters::prelude::*;
@@ -28,7 +29,7 @@ pub type Curve = Vec<(f64, f64, f64)>;
 /// dashes, the verdict's model with its band of two standard deviations; suspects are ringed.
 pub fn overlay(
     title: &str,
-    (x_name, span): (&str, Span),
+    (x_name, span): (&str, AxisRange),
     points: &[Seen],
     baseline: &Curve,
     corrected: &Curve,
@@ -76,7 +77,7 @@ pub struct LawPass {
 /// law alone.
 pub fn law(
     name: &str,
-    (x_name, span): (&str, Span),
+    (x_name, span): (&str, AxisRange),
     passes: &[LawPass],
     curve: &Curve,
     alone: &[(f64, f64)],
@@ -87,7 +88,7 @@ pub fn law(
     let [low, high] = all().fold([0.0f64; 2], |[l, h], v| [l.min(v), h.max(v)]);
     let margin = 0.06 * (high - low);
     let axis = [(low - margin).max(-1.5), (high + margin).min(1.5)];
-    let y = (Span::linear(axis[0]..axis[1]), "change of \u{3bc}'");
+    let y = (AxisRange::linear(axis[0]..axis[1]), "change of \u{3bc}'");
     let cut = |v: f64| v.clamp(axis[0], axis[1]);
     let svg = figure(PANEL, (span, x_name), y, &alt, |chart, size| {
         let edge = |k: f64| edge_of(curve, k, axis);
@@ -113,7 +114,7 @@ pub fn parity(points: &[(f64, f64, f64, bool)]) -> miette::Result<String> {
         let alt =
             format!("Measured relative friction of {} passes against that of the {name}.", points.len());
         let x_name = format!("\u{3bc}' of the {name}");
-        let span = Span::linear(bottom..top);
+        let span = AxisRange::linear(bottom..top);
         let cut = |v: f64| v.clamp(bottom, top);
         let place = |p: &(f64, f64, f64, bool)| (cut(if which == 0 { p.1 } else { p.2 }), cut(p.0));
         let svg = figure(PANEL, (span, &x_name), (span, "measured \u{3bc}'"), &alt, |chart, size| {
@@ -134,8 +135,8 @@ pub fn parity(points: &[(f64, f64, f64, bool)]) -> miette::Result<String> {
 pub fn errors_against(c: &Covariate, limit: f64, points: &[Seen]) -> miette::Result<String> {
     let name = titled(c);
     let alt = format!("Errors of {} passes against {}, before and after.", points.len(), c.words);
-    let x = Span::over(points.iter().map(|p| p.x), c.scale == Scale::Log);
-    let y = (Span::linear(-limit..limit), "error, sd");
+    let x = AxisRange::over(points.iter().map(|p| p.x), c.scale == Scale::Log);
+    let y = (AxisRange::linear(-limit..limit), "error, sd");
     let svg = figure(PANEL, (x, &name), y, &alt, |chart, size| {
         let cut = |e: f64| e.clamp(-limit, limit);
         draw(chart, points.iter().map(|p| mark(1, (p.x, cut(p.before)), size - 1, COLOURS[1], false)))?;
@@ -150,8 +151,8 @@ pub fn errors_against(c: &Covariate, limit: f64, points: &[Seen]) -> miette::Res
 pub fn edge(title: &str, mean: &[[f64; 4]]) -> miette::Result<String> {
     let alt = format!("{title}: the mean edge as measured, as expected in time, and with what was found.");
     let shown = |from: &[f64; 4]| (-0.02..0.2).contains(&from[0]);
-    let x = (Span::linear(-20.0..200.0), "time from the command, ms");
-    let y = (Span::linear(-0.2..1.25), "share of the change");
+    let x = (AxisRange::linear(-20.0..200.0), "time from the command, ms");
+    let y = (AxisRange::linear(-0.2..1.25), "share of the change");
     let svg = figure(PANEL, x, y, &alt, |chart, size| {
         let of = |which: usize| -> Vec<(f64, f64)> {
             mean.iter().filter(|m| shown(m)).map(|m| (1e3 * m[0], m[which].clamp(-0.2, 1.25))).collect()

@@ -1,7 +1,7 @@
 //! HyperQueue and Dask, spoken to in Python by their own packages, with the script `hand_over.py` beside this file: it hands the tasks
 //! over and stays until they have ended. HyperQueue goes on without it; a Dask scheduler drops what waits when its client leaves.
 
-use super::{Engine, Handed, Job, numbers};
+use super::{Accepted, ClusterJob, Engine, numbers};
 use miette::{Context, IntoDiagnostic, miette};
 use runs::files;
 use std::io::{BufRead, BufReader, Write};
@@ -11,22 +11,23 @@ use std::process::{Command, Stdio};
 /// HyperQueue.
 pub const HYPERQUEUE: Engine = Engine { name: "hq", submit, again, alive, cancel };
 /// Dask.distributed.
-pub const DASK: Engine = Engine { name: "dask", submit, again: |_, job| Ok(Handed::of(job)), alive, cancel };
+pub const DASK: Engine =
+    Engine { name: "dask", submit, again: |_, job| Ok(Accepted::of(job)), alive, cancel };
 
 /// What speaks to them.
 const SCRIPT: &str = include_str!("hand_over.py");
 
-fn submit(folder: &Path, job: &Job) -> miette::Result<Handed> {
+fn submit(folder: &Path, job: &ClusterJob) -> miette::Result<Accepted> {
     job.write(folder)?;
     begun(folder, job, &[])
 }
 
-fn again(folder: &Path, job: &Job) -> miette::Result<Handed> {
+fn again(folder: &Path, job: &ClusterJob) -> miette::Result<Accepted> {
     begun(folder, job, numbers(&job.ids)?)
 }
 
 /// Starts the script; its first line names the job, or what is wrong.
-fn begun(folder: &Path, job: &Job, ids: &[String]) -> miette::Result<Handed> {
+fn begun(folder: &Path, job: &ClusterJob, ids: &[String]) -> miette::Result<Accepted> {
     let mut options = std::fs::OpenOptions::new();
     let path = folder.join("log.txt");
     let log = files::open_plain(&path, options.create(true).append(true));
@@ -60,15 +61,15 @@ fn begun(folder: &Path, job: &Job, ids: &[String]) -> miette::Result<Handed> {
         let last = log.lines().rev().find(|l| l.contains("Error")).unwrap_or("no output").to_string();
         return Err(miette!("{} takes no tasks: {last} (all of it: {})", job.engine, path.display()));
     };
-    Ok(Handed { ids, child: Some(child), tasks: job.ranges.len() as u64, ..Handed::of(job) })
+    Ok(Accepted { ids, child: Some(child), tasks: job.ranges.len() as u64, ..Accepted::of(job) })
 }
 
-fn alive(_: &Path, _: &Job, handed: &mut Handed) -> miette::Result<bool> {
+fn alive(_: &Path, _: &ClusterJob, handed: &mut Accepted) -> miette::Result<bool> {
     Ok(handed.child.as_mut().is_some_and(|child| matches!(child.try_wait(), Ok(None))))
 }
 
 /// Their workers look for the file `cancelled` in the job's folder, which is there by now: those that wait
 /// end at once, those at work after their portion.
-fn cancel(_: &Job) -> miette::Result<()> {
+fn cancel(_: &ClusterJob) -> miette::Result<()> {
     Ok(())
 }

@@ -4,7 +4,7 @@
 //! the site refuses one, what runs goes on and the rest is tried again later, in smaller arrays.
 #![allow(clippy::disallowed_methods, reason = "a refused submission is repeated in wall-clock time")]
 
-use super::{Engine, Handed, Job, numbers};
+use super::{Accepted, ClusterJob, Engine, numbers};
 use miette::{Context, IntoDiagnostic, miette};
 use runs::print::quoted;
 use runs::say;
@@ -37,7 +37,7 @@ const PASSING: [&str; 7] = [
 
 /// The batch script: `ranges.txt` has the ranges of a task in as many lines as the task has cores. They run
 /// side by side. A task that succeeds removes its log.
-fn script(folder: &Path, job: &Job) -> String {
+fn script(folder: &Path, job: &ClusterJob) -> String {
     let command: Vec<String> = job.command.iter().map(quoted).collect();
     format!(
         "#!/bin/sh\n\
@@ -68,24 +68,24 @@ fn ran(command: &mut Command) -> miette::Result<Output> {
     command.output().into_diagnostic().wrap_err_with(|| format!("{name} cannot be run: is Slurm here?"))
 }
 
-fn submit(folder: &Path, job: &Job) -> miette::Result<Handed> {
+fn submit(folder: &Path, job: &ClusterJob) -> miette::Result<Accepted> {
     let lines: String = job.ranges.iter().map(|r| format!("{}..{}\n", r.start, r.end)).collect();
     runs::files::write_plain(&folder.join("ranges.txt"), lines)?;
     runs::files::write_plain(&folder.join("task.sh"), script(folder, job))?;
     runs::files::make_folder(&folder.join("logs"))?;
-    let mut handed = Handed { array: array_of(job), ..Handed::of(job) };
+    let mut handed = Accepted { array: array_of(job), ..Accepted::of(job) };
     more(folder, job, &mut handed, 0)?;
     Ok(handed)
 }
 
 /// Tasks of an array: half a window, so that one array waits while another runs.
-fn array_of(job: &Job) -> u64 {
+fn array_of(job: &ClusterJob) -> u64 {
     (job.window / 2).clamp(1, ARRAY)
 }
 
 /// Hands arrays over while the window has room beside what is `queued` and the site takes them; fails at a
 /// refusal that does not pass by itself, or one that lasts.
-fn more(folder: &Path, job: &Job, handed: &mut Handed, mut queued: u64) -> miette::Result<()> {
+fn more(folder: &Path, job: &ClusterJob, handed: &mut Accepted, mut queued: u64) -> miette::Result<()> {
     let tasks = (job.ranges.len() as u64).div_ceil(job.cores_a_task);
     while handed.tasks < tasks && handed.pause_until.is_none_or(|until| Instant::now() >= until) {
         let count = handed.array.min(tasks - handed.tasks);
@@ -102,7 +102,7 @@ fn more(folder: &Path, job: &Job, handed: &mut Handed, mut queued: u64) -> miett
             (handed.tasks, handed.refusals, handed.pause_until) = (handed.tasks + count, 0, None);
             handed.array = array_of(job).min(2 * handed.array);
             queued += count;
-            Job { ids: handed.ids.clone(), ..job.clone() }.write(folder)?;
+            ClusterJob { ids: handed.ids.clone(), ..job.clone() }.write(folder)?;
             continue;
         }
         let stderr = String::from_utf8_lossy(&output.stderr).into_owned();
@@ -124,7 +124,7 @@ fn more(folder: &Path, job: &Job, handed: &mut Handed, mut queued: u64) -> miett
 
 /// The command that hands over `count` tasks from `first` on. The user's options come last, so that they
 /// count.
-fn array(folder: &Path, job: &Job, first: u64, count: u64) -> Command {
+fn array(folder: &Path, job: &ClusterJob, first: u64, count: u64) -> Command {
     let at_once = job.workers.map(|n| format!("%{}", (n / job.cores_a_task).max(1))).unwrap_or_default();
     let mut command = Command::new("sbatch");
     command
@@ -143,16 +143,16 @@ fn array(folder: &Path, job: &Job, first: u64, count: u64) -> Command {
     command
 }
 
-fn again(_: &Path, job: &Job) -> miette::Result<Handed> {
+fn again(_: &Path, job: &ClusterJob) -> miette::Result<Accepted> {
     numbers(&job.ids)?;
     // Programs come from the command line alone: what was not handed over then follows after this job.
-    Ok(Handed { tasks: job.ranges.len() as u64, ..Handed::of(job) })
+    Ok(Accepted { tasks: job.ranges.len() as u64, ..Accepted::of(job) })
 }
 
 /// A controller that does not answer says nothing about its jobs: they may go on. Tasks that Slurm holds (it
 /// does so where it could not start them, as after a controller that died) never start by themselves: where
 /// nothing else is left they are taken back, and what is missing is handed over again.
-fn alive(folder: &Path, job: &Job, handed: &mut Handed) -> miette::Result<bool> {
+fn alive(folder: &Path, job: &ClusterJob, handed: &mut Accepted) -> miette::Result<bool> {
     let mut queued = 0;
     if !handed.ids.is_empty() {
         let mut query = Command::new("squeue");
@@ -178,7 +178,7 @@ fn alive(folder: &Path, job: &Job, handed: &mut Handed) -> miette::Result<bool> 
     Ok(queued > 0 || handed.tasks > before || handed.tasks * job.cores_a_task < job.ranges.len() as u64)
 }
 
-fn cancel(job: &Job) -> miette::Result<()> {
+fn cancel(job: &ClusterJob) -> miette::Result<()> {
     if job.ids.is_empty() {
         return Ok(());
     }

@@ -3,8 +3,8 @@
 use super::{Case, CaseKind, Cell, count, line, number, text, word};
 use crate::cases::file::Header;
 use calibration::certificate::sha256_hex;
-use diagnosis::document::document;
-use diagnosis::hypotheses::Options;
+use diagnosis::Options;
+use diagnosis::report::document::document;
 use miette::Context;
 use runs::input::{MAX_TABLE_BYTES, bytes_of, rig_text, text_of};
 use serde::{Deserialize, Serialize};

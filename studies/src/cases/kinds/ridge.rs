@@ -3,7 +3,7 @@
 use super::{Case, CaseKind, Cell, Column, count, flag, number};
 use crate::cases::file::Header;
 use miette::IntoDiagnostic;
-use models::quantity::PeakToPeak;
+use models::PeakToPeak;
 use models::ridge::{self, RidgeCase, RunSettings, Steady, case, study};
 use serde::{Deserialize, Serialize};
 use std::collections::BTreeMap;
@@ -55,7 +55,7 @@ const COLUMNS: [Column; 18] = [
 /// From where to where a variable is drawn.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
-pub struct Span {
+pub struct ValueRange {
     /// Least value.
     pub low: f64,
     /// Greatest value.
@@ -65,7 +65,7 @@ pub struct Span {
     pub log: bool,
 }
 
-impl Span {
+impl ValueRange {
     /// The value at a place, 0 to 1.
     pub fn at(&self, place: f64) -> f64 {
         if self.log {
@@ -87,7 +87,7 @@ pub struct Settings {
     /// Variables that differ from the paper's nominal case in all cases.
     pub base: BTreeMap<String, f64>,
     /// Variables that are drawn; none where the cases are listed.
-    pub spans: BTreeMap<String, Span>,
+    pub spans: BTreeMap<String, ValueRange>,
     /// Number of the first draw, from 1: other draws are other cases of the same box.
     pub first: u64,
     /// What all cases start from where that is not the paper's nominal case; `elements` is then of it too.
@@ -105,7 +105,7 @@ impl Default for Settings {
 impl Settings {
     /// Refuses a variable that is both shared and drawn, and a span beyond what a ridge can have.
     pub fn check_spans(&self) -> miette::Result<()> {
-        for (name, Span { low, high, .. }) in &self.spans {
+        for (name, ValueRange { low, high, .. }) in &self.spans {
             let shared = self.base.contains_key(name);
             miette::ensure!(!shared, help = "leave out one of the two", "{name} is in --set and in --span");
             for end in [low, high] {
@@ -192,7 +192,7 @@ fn prepare(header: &Header, _: &std::path::Path) -> miette::Result<super::Make> 
     }
     base.check().into_diagnostic()?;
     base.geometry.mesh(base.materials(), base.elements).into_diagnostic()?;
-    for (name, &Span { low, high, log }) in &settings.spans {
+    for (name, &ValueRange { low, high, log }) in &settings.spans {
         if !(low < high && (!log || low > 0.0)) {
             miette::bail!(
                 "span of {name}: {low} to {high}: from a lower to a higher value, above 0 in the logarithm"
@@ -261,7 +261,7 @@ mod tests {
     #[test]
     fn a_span_beyond_what_a_ridge_can_have_or_of_a_shared_variable_is_refused() {
         let check = |name: &str, low, high| {
-            let spans = BTreeMap::from([(name.to_string(), Span { low, high, log: false })]);
+            let spans = BTreeMap::from([(name.to_string(), ValueRange { low, high, log: false })]);
             let base = BTreeMap::from([("mu0".to_string(), 0.4)]);
             Settings { base, spans, ..Settings::default() }.check_spans()
         };

@@ -8,9 +8,9 @@
 use super::Scored;
 use diagnosis::data::{RigFile, Table};
 use diagnosis::hypotheses::{Options, fit_all};
-use diagnosis::least_squares::minimise;
+use diagnosis::regression::least_squares::minimise;
 use effects::library;
-use models::rig_file::PassNoise;
+use models::PassNoise;
 use sim::sealed::Set;
 use std::collections::BTreeMap;
 

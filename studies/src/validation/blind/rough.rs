@@ -1,9 +1,7 @@
 //! The verdict on scatter that is not what rig.toml states: bad passes, heavy tails, runs, a wrong statement.
 
-use diagnosis::Verdict;
 use diagnosis::data::{RigFile, Table};
-use diagnosis::hypotheses::Options;
-use diagnosis::verdict::{Report, diagnose};
+use diagnosis::{Options, Report, Verdict, diagnose};
 use rayon::prelude::*;
 use serde::Serialize;
 use sim::defects::DefectKind;
@@ -14,7 +12,7 @@ pub const TRUTHS: [&str; 4] = ["none", "squeeze_film", "load_dependent_friction"
 
 /// Answers on the sets of one kind of scatter and one truth.
 #[derive(Debug, Clone, Default, PartialEq, Serialize)]
-pub struct Answers {
+pub struct NoiseScore {
     /// Kind of scatter.
     pub noise: String,
     /// The cause, or `none`.
@@ -41,13 +39,13 @@ pub struct Answers {
     pub falsely: usize,
 }
 
-impl Answers {
+impl NoiseScore {
     /// The answer on one set.
     fn of(noise: &str, truth: &str, set: &RoughSet, report: &Report) -> Self {
         let leads = &report.hypotheses[0].effects;
         let bad = |point: &u64| set.bad.contains(point);
         let found = report.scatter.suspects.iter().filter(|s| bad(&s.point)).count();
-        let mut one = Answers {
+        let mut one = NoiseScore {
             noise: noise.into(),
             truth: truth.into(),
             sets: 1,
@@ -55,7 +53,7 @@ impl Answers {
             found,
             good: set.passes.len() - set.bad.len(),
             falsely: report.scatter.suspects.len() - found,
-            ..Answers::default()
+            ..NoiseScore::default()
         };
         match report.verdict {
             Verdict::Named if *leads == [truth] => one.right = 1,
@@ -109,8 +107,8 @@ pub fn run(
     (name, roughness): (&str, Roughness),
     truths: &[&str],
     options: &Options,
-    progress: impl Fn(u64, &RoughSet, &Report, &Answers) + Sync,
-) -> miette::Result<Vec<Answers>> {
+    progress: impl Fn(u64, &RoughSet, &Report, &NoiseScore) + Sync,
+) -> miette::Result<Vec<NoiseScore>> {
     let of_truth = |truth: &&str| {
         let named = || DefectKind::named(truth).ok_or_else(|| miette::miette!("no cause is named '{truth}'"));
         let kind = (*truth != "none").then(named).transpose()?;
@@ -118,13 +116,13 @@ pub fn run(
             let own = seed.wrapping_mul(1_000_003).wrapping_add(k);
             let set = rough(own, kind, roughness);
             let report = answer(&set, options)?;
-            let one = Answers::of(name, truth, &set, &report);
+            let one = NoiseScore::of(name, truth, &set, &report);
             progress(own, &set, &report, &one);
             Ok(one)
         };
-        let all = (0..count as u64).into_par_iter().map(one).collect::<miette::Result<Vec<Answers>>>()?;
-        let none = Answers { noise: name.into(), truth: (*truth).into(), ..Answers::default() };
-        Ok(all.iter().fold(none, Answers::with))
+        let all = (0..count as u64).into_par_iter().map(one).collect::<miette::Result<Vec<NoiseScore>>>()?;
+        let none = NoiseScore { noise: name.into(), truth: (*truth).into(), ..NoiseScore::default() };
+        Ok(all.iter().fold(none, NoiseScore::with))
     };
     truths.iter().map(of_truth).collect()
 }

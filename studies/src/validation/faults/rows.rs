@@ -7,8 +7,8 @@
 //! plausible by chance, so its bound allows for that. Two spikes side by side are an overforce.
 
 use super::tamper::Tamper;
-use realtime::fault::{FaultMode, Target};
-use realtime::ports::Nanos;
+use realtime::Nanos;
+use realtime::fault::{FaultMode, FaultTarget};
 use realtime::safety::{Cause, ChannelTiming, Limits, Timing};
 use serde::{Deserialize, Serialize};
 
@@ -43,7 +43,7 @@ const STEADY: &[Moment] = &[Moment::Hold, Moment::Slide];
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub enum What {
     /// A fault of a channel: where, which, its strength, and for how many ms.
-    Channel(Target, FaultMode, f64, u64),
+    Channel(FaultTarget, FaultMode, f64, u64),
     /// The instruments show something that must not be.
     Shown(Tamper),
     /// Cycles begin late.
@@ -202,7 +202,7 @@ macro_rules! rows {
 
 use Expect::{NoMu, NoTrip, Off, Remark, RemarkOrOff};
 use FaultMode as F;
-use Target as T;
+use FaultTarget as T;
 use What::{Channel, Late, Paused, Shown};
 
 rows! {

@@ -4,19 +4,16 @@
 use super::rows::{Expect, Moment, Pace, ROWS, TOO_LATE, What};
 use super::tamper::{Tamper, Tampered};
 use calibration::certificate::sha256_hex;
-use models::condition::{Condition, OutOfDomain};
-use models::finger::Finger;
+use models::Target;
 use models::law::Rendering;
 use models::prediction::{FrictionModel, Prediction, SpringSlider};
-use models::quantity::PeakToPeak;
-use models::target::Target;
+use models::{Condition, Finger, OutOfDomain, PeakToPeak};
 use realtime::cycle::{Command, Config, Marker, Phase};
 use realtime::estimate::{EstimateConfig, Mu0};
 use realtime::fault::{Fault, FaultMode, FaultyAmplifier, FaultyForce, FaultyStage};
-use realtime::ports::Nanos;
 use realtime::replay::replay;
 use realtime::safety::{Cause, Exposed, Limits, Request, Trip};
-use realtime::turn::{Ports, Row};
+use realtime::{Nanos, Ports, Row};
 use runs::supervisor::{Loop, VirtualLoop};
 use serde::{Deserialize, Serialize};
 use sim::amplifier::AmplifierInput;
@@ -267,26 +264,9 @@ pub fn run_with(scene: &Scene, keep: bool, core: Core) -> Found {
     let slider = SpringSlider::new(Finger::paper()).expect("the paper's finger is one");
     let diverges = scene.first(|w| w == What::ModelDiverges).map(time_of);
     let model = Arc::new(Rendering { law: Arc::new(Diverging(slider, diverges)), target: grating() });
-    let rig = VirtualRig::new(&scene.world(), scene.seed).expect("the bench's world can be");
-    let [force, amplifier, stage] = rig.split();
-    let world = force.clone();
     let deaf = core == Core::Deaf;
-    let faults = if deaf { Vec::new() } else { scene.faults() };
     let shown = Arc::new(AtomicU64::new(0));
-    let tamper = scene.strikes.iter().find_map(|s| match ROWS[s.row].what {
-        What::Shown(tamper) if !deaf => Some((tamper, time_of(s.at))),
-        _ => None,
-    });
-    let tampered = |inner| Tampered::new(inner, tamper, &shown);
-    let holds_dead_man_from = Some(time_of(20));
-    world.rig().world.operator = Operator { holds_dead_man_from, ..Operator::default() };
-    let (supply, contacts) = (world.clone(), world.clone());
-    let ports = Ports::new(
-        Box::new(FaultyForce::new(tampered(force), &faults, scene.seed)),
-        Box::new(FaultyAmplifier::new(tampered(amplifier), &faults, scene.seed)),
-        Box::new(FaultyStage::new(tampered(stage), &faults, scene.seed)),
-    );
-    let ports = Ports { supply: Box::new(supply), contacts: Box::new(contacts), ..ports };
+    let (world, ports) = wired(scene, deaf, &shown);
     let mut controller = VirtualLoop::new(config, Arc::clone(&model) as Arc<dyn FrictionModel>, ports);
     let mut watch = Watch { shown: vec![None; scene.strikes.len()], ..Watch::default() };
     let mut rows = Vec::new();
@@ -353,17 +333,42 @@ pub fn run_with(scene: &Scene, keep: bool, core: Core) -> Found {
     }
     let mut found = watch.judge(scene);
     if keep {
-        let written: Vec<u8> =
-            rows.iter().flat_map(|row| serde_json::to_vec(row).unwrap_or_default()).collect();
-        found.hash = Some(sha256_hex(&written));
-        // What a record would hold, run again.
-        let written = rows.iter().filter_map(|r| serde_json::from_slice(&serde_json::to_vec(r).ok()?).ok());
-        let again = replay(&config, &*model, written.collect::<Vec<Row>>());
-        if again.cycles as usize != rows.len() || !again.holds() {
-            found.wrong.push(format!("replayed, the decisions differ: {again:?}"));
-        }
+        run_again(&config, &*model, &rows, &mut found);
     }
     found
+}
+
+/// The virtual rig of a scene, and its ports with the scene's faults in them; a deaf core has none.
+fn wired(scene: &Scene, deaf: bool, shown: &Arc<AtomicU64>) -> (SharedRig, Ports) {
+    let rig = VirtualRig::new(&scene.world(), scene.seed).expect("the bench's world can be");
+    let [force, amplifier, stage] = rig.split();
+    let world = force.clone();
+    let faults = if deaf { Vec::new() } else { scene.faults() };
+    let tamper = scene.strikes.iter().find_map(|s| match ROWS[s.row].what {
+        What::Shown(tamper) if !deaf => Some((tamper, time_of(s.at))),
+        _ => None,
+    });
+    let tampered = |inner| Tampered::new(inner, tamper, shown);
+    let holds_dead_man_from = Some(time_of(20));
+    world.rig().world.operator = Operator { holds_dead_man_from, ..Operator::default() };
+    let ports = Ports::new(
+        Box::new(FaultyForce::new(tampered(force), &faults, scene.seed)),
+        Box::new(FaultyAmplifier::new(tampered(amplifier), &faults, scene.seed)),
+        Box::new(FaultyStage::new(tampered(stage), &faults, scene.seed)),
+    );
+    let ports = Ports { supply: Box::new(world.clone()), contacts: Box::new(world.clone()), ..ports };
+    (world, ports)
+}
+
+/// What a record would hold, run again: the decisions must be the same.
+fn run_again(config: &Config, model: &dyn FrictionModel, rows: &[Row], found: &mut Found) {
+    let written: Vec<u8> = rows.iter().flat_map(|row| serde_json::to_vec(row).unwrap_or_default()).collect();
+    found.hash = Some(sha256_hex(&written));
+    let written = rows.iter().filter_map(|r| serde_json::from_slice(&serde_json::to_vec(r).ok()?).ok());
+    let again = replay(config, model, written.collect::<Vec<Row>>());
+    if again.cycles as usize != rows.len() || !again.holds() {
+        found.wrong.push(format!("replayed, the decisions differ: {again:?}"));
+    }
 }
 
 /// What is noted while a scene runs.
@@ -530,13 +535,13 @@ impl Watch {
 /// readback of twice the amplitude right, and its heartbeat feeds the watchdog that a cut link would have let
 /// fire. What then counts is the slower of the two bounds, from the later strike on.
 fn interact(scene: &Scene) -> bool {
-    use realtime::fault::Target;
+    use realtime::fault::FaultTarget;
     let amplifier = |s: &Strike| {
         matches!(
             ROWS[s.row].what,
             What::RogueMaster
                 | What::StopRefused
-                | What::Channel(Target::Drive | Target::Amplifier, ..)
+                | What::Channel(FaultTarget::Drive | FaultTarget::Amplifier, ..)
                 | What::Shown(Tamper::AmplitudeTimes(_) | Tamper::AmplitudeLost | Tamper::AmplitudeStuck)
         )
     };
@@ -556,10 +561,11 @@ pub fn measured_bound(scene: &Scene) -> u64 {
         let state_age = scene.pace.timing(T, RING).amplifier.age_limit().0.div_ceil(T.0);
         // States that are garbage say by turns that the output is on and that it is off: the first 'on' after
         // that time counts.
-        let garbage =
-            has(|w| matches!(w, What::Channel(realtime::fault::Target::Amplifier, FaultMode::Garbage, ..)));
+        let garbage = has(|w| {
+            matches!(w, What::Channel(realtime::fault::FaultTarget::Amplifier, FaultMode::Garbage, ..))
+        });
         state_age + 10 + ring_cycles() + if garbage { 20 } else { 0 }
-    } else if has(|w| matches!(w, What::Channel(realtime::fault::Target::Drive, ..))) {
+    } else if has(|w| matches!(w, What::Channel(realtime::fault::FaultTarget::Drive, ..))) {
         WATCHDOG + ring_cycles()
     } else {
         ring_cycles()

@@ -71,11 +71,13 @@ pub fn scene_of(seed: u64, pairs: bool, pace: Pace) -> Scene {
 /// channel twice, or alters what an instrument shows before a channel loses it, is judged one by one only.
 fn compatible(a: usize, b: usize) -> bool {
     use super::rows::What::{Channel, Paused, Shown};
-    use realtime::fault::Target;
+    use realtime::fault::FaultTarget;
     let share = ROWS[a].moments.iter().any(|m| ROWS[b].moments.contains(m));
     let apart = match (ROWS[a].what, ROWS[b].what) {
         (Channel(one, ..), Channel(other, ..)) => {
-            let channel = |t| if matches!(t, Target::Lateral | Target::Normal) { Target::Force } else { t };
+            let channel = |t| {
+                if matches!(t, FaultTarget::Lateral | FaultTarget::Normal) { FaultTarget::Force } else { t }
+            };
             channel(one) != channel(other)
         }
         (Channel(..), Shown(_)) | (Shown(_), Channel(..)) | (Shown(_), Shown(_)) => false,

@@ -6,12 +6,12 @@ use toml::Spanned;
 use toml::de::{DeTable, DeValue};
 
 /// A place in a text; a JSON document has none.
-pub type Place = Option<Range<usize>>;
+pub type TextRange = Option<Range<usize>>;
 
 /// A value of a file, and its place.
 pub struct Node {
     pub is: Is,
-    pub span: Place,
+    pub span: TextRange,
 }
 
 /// What a value is, whatever the language.
@@ -27,7 +27,7 @@ pub enum Is {
 }
 
 /// A key of a table, its place, and its value.
-pub type Entry = (String, Place, Node);
+pub type Entry = (String, TextRange, Node);
 
 impl Node {
     fn toml(value: &Spanned<DeValue<'_>>) -> Self {

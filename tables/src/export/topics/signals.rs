@@ -1,8 +1,7 @@
 //! What of a cycle is a curve: a topic a quantity, its unit at the end of the name.
 
-use realtime::cycle::Phase;
 use realtime::ports::{AmplifierState, StageState};
-use realtime::turn::Row;
+use realtime::{Phase, Row};
 
 /// One curve.
 pub struct Signal {

@@ -6,7 +6,7 @@ use crate::import::clock::is_time;
 use crate::import::grid::{Cell, Grid, Row};
 use crate::import::guess::{open_unit, stroke, taken, unit_of};
 use crate::import::targets::Id;
-use instruments::units::Unit;
+use instruments::Unit;
 
 /// Why columns with a name of that column of the point table were not guessed.
 pub(super) fn open(map: &Map, grid: &Grid, column: &str) -> String {

@@ -3,8 +3,8 @@
 use super::{Constant, Map, Taken, stated, unit_row};
 use crate::import::apart;
 use crate::import::grid::Grid;
-use crate::import::targets::{ColumnKind, Id, TARGETS, Target};
-use instruments::units::{Dimension, Unit};
+use crate::import::targets::{ColumnKind, ColumnTarget, Id, TARGETS};
+use instruments::{Dimension, Unit};
 
 /// What is wrong with an entry of `--map` or `--set`, or with the map under a second header (in row `row`).
 #[derive(Clone, Debug, PartialEq, Eq, thiserror::Error)]
@@ -13,7 +13,7 @@ pub enum MapError {
     #[error("'{0}': HEADER=TARGET:UNIT is needed")]
     MapEntry(String),
     #[error("'{0}' is not a target; there are {known}", known = names())]
-    Target(String),
+    ColumnTarget(String),
     #[error("'{name}' has no unit ('{unit}')")]
     Unitless { name: String, unit: String },
     #[error("'{unit}' is not a unit of {name}; there are {}", .dimension.known())]
@@ -90,11 +90,11 @@ fn names() -> String {
 
 /// The target and the unit of `TARGET[:UNIT]`. The name of a column of the point table states its unit; of
 /// any other it may be `written` in the source beyond doubt.
-fn target_of(text: &str, written: Option<&str>) -> Result<(&'static Target, Unit, String), MapError> {
+fn target_of(text: &str, written: Option<&str>) -> Result<(&'static ColumnTarget, Unit, String), MapError> {
     let (name, unit_text) =
         text.split_once(':').map_or((text.trim(), None), |(n, u)| (n.trim(), Some(u.trim())));
     let own = || name.to_string();
-    let target = Target::named(name).ok_or_else(|| MapError::Target(own()))?;
+    let target = ColumnTarget::named(name).ok_or_else(|| MapError::ColumnTarget(own()))?;
     let Some(dimension) = target.dimension() else {
         return match unit_text {
             // The words for forward and backward.
@@ -155,7 +155,7 @@ fn constant(entry: &str) -> Result<Option<Constant>, MapError> {
     let (name, text) = entry.split_once('=').ok_or_else(|| MapError::SetEntry(entry.into()))?;
     let (name, text) = (name.trim(), text.trim());
     let (number, unit) = text.split_once(':').map_or((text, None), |(n, u)| (n.trim(), Some(u)));
-    let target = Target::named(name).ok_or_else(|| MapError::SetTarget(name.into()))?;
+    let target = ColumnTarget::named(name).ok_or_else(|| MapError::SetTarget(name.into()))?;
     if target.id == Id::Time && number == "rows" {
         return Ok(None);
     }

@@ -2,7 +2,7 @@
 
 use super::{Map, Taken, doubts};
 use crate::import::grid::Grid;
-use crate::import::targets::{Id, Target};
+use crate::import::targets::{ColumnTarget, Id};
 use models::covariate;
 
 /// What gives a column.
@@ -28,7 +28,7 @@ fn how(column: &str, series: bool) -> &'static str {
 impl Map {
     /// Whether the plate vibrates in some row, as far as amplitudes are given.
     fn vibrates(&self, grid: &Grid) -> bool {
-        let is_amplitude = |target: &Target| target.column == Id::AmplitudePp.target().column;
+        let is_amplitude = |target: &ColumnTarget| target.column == Id::AmplitudePp.target().column;
         let value = |c: &Taken, r| c.unit.apply(&grid.cell(r, c.index)?.digits(grid.comma)?);
         let in_rows = |c: &Taken| grid.rows.iter().any(|r| value(c, r).is_some_and(|a| a > 0.0));
         self.constants.iter().any(|c| is_amplitude(c.target) && c.value > 0.0)

@@ -2,7 +2,7 @@
 
 use super::{Map, MapError, Taken, stated, unit_row};
 use crate::import::grid::{Block, Grid};
-use instruments::units::Unit;
+use instruments::Unit;
 
 /// The map under another header of the source: the same columns, wherever they are there and whatever their
 /// units. `None` where that header has none of them.

@@ -3,7 +3,7 @@
 use super::path::{pieces, sums};
 use crate::import::targets::Id;
 use crate::import::values::{Values, mean as average, middle, sorted};
-use models::pass::Pass;
+use models::Pass;
 
 /// Relative change over the window about a sample from which it is not steady.
 const STEADY: f64 = 0.1;

@@ -2,7 +2,7 @@
 
 use super::delimiter::is_number;
 use crate::import::grid::{Cell, Row};
-use instruments::units::Unit;
+use instruments::Unit;
 
 /// Takes marks between thousands out of numbers: those that are no decimal mark anywhere, and the other one
 /// of point and comma where the decimal mark is stated.

@@ -5,7 +5,7 @@ use crate::import::apart;
 use crate::import::clock::is_time;
 use crate::import::grid::{Cell, Row, exponent, middle};
 use crate::import::head::NO_ROWS_HELP;
-use instruments::units::Unit;
+use instruments::Unit;
 use miette::IntoDiagnostic;
 
 /// Delimiters that are tried, in this order where two serve as well.

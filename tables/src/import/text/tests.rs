@@ -2,7 +2,7 @@
 
 use super::*;
 use crate::import::grid::Cell;
-use instruments::units::Unit;
+use instruments::Unit;
 
 fn grid(text: &str) -> Grid {
     read(text.as_bytes(), Marks::default()).unwrap_or_else(|e| panic!("{text}: {e:?}"))
