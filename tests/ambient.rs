@@ -3,7 +3,7 @@
 
 use models::SpringSlider;
 use realtime::{Phase, Row};
-use runs::ambient::{AmbientControl, Level, OperatorAnswers, Source, World};
+use runs::ambient::{AmbientControl, Level, OperatorAnswers, SimulatedAir, Source};
 use runs::job::{Job, Signals, Update};
 use runs::plan::{Plan, Resolution};
 use runs::supervisor::{self, Requests, VirtualLoop};
@@ -308,7 +308,7 @@ fn every_step_of_a_person_finds_the_rig_disarmed() {
         .guarded_by(&setup.config.limits)
         .at_rig(&plan, &setup);
     let world = sim::virtual_rig::VirtualRig::new(&sim::world::WorldConfig::ideal(), 1).unwrap().split();
-    let air = World::Virtual(world[0].clone());
+    let air = SimulatedAir::Virtual(world[0].clone());
     let mut ambient_control =
         AmbientControl::open(&sweep, None, Some(air), OperatorAnswers::Simulated).unwrap();
     let [force, amplifier, stage] = world;

@@ -1,7 +1,7 @@
 //! Lags and shifts in time that are withheld in the virtual rig are found in a run's edges, with their
 //! size; none is claimed where there is none, whatever else acts.
 
-use diagnosis::report::timing::{Comparison, judge, mean_delay_s};
+use diagnosis::report::timing::{TimingComparison, judge, mean_delay_s};
 use models::SpringSlider;
 use rayon::prelude::*;
 use runs::edges::Collector;
@@ -33,7 +33,7 @@ fn world(defects: &str) -> WorldConfig {
     WorldConfig { defects: Defects::parse(defects).unwrap(), ..WorldConfig::ideal() }
 }
 
-fn run(seed: u64, world: &WorldConfig) -> [Comparison; 2] {
+fn run(seed: u64, world: &WorldConfig) -> [TimingComparison; 2] {
     let setup = Setup::load("virtual-ideal").unwrap();
     let model = Arc::new(SpringSlider::new(setup.tip.finger).unwrap());
     let mut found = Collector::default();

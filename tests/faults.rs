@@ -1,6 +1,6 @@
 //! The fault list in virtual time: each fault in each phase, its worst reaction beside its bound, and its cause.
 
-use studies::cases::kinds::faults::{Settings, search};
+use studies::cases::kinds::faults::{FaultSettings, search};
 use studies::validation::faults::rows::What;
 use studies::validation::faults::scene::STEADY_AT;
 use studies::validation::faults::search::judged;
@@ -69,7 +69,7 @@ fn without_a_fault_nothing_trips() {
     }
 }
 
-fn many(settings: Settings, seeds: u64) -> Tally {
+fn many(settings: FaultSettings, seeds: u64) -> Tally {
     search(&settings, seeds, &mut |_| {}).unwrap()
 }
 
@@ -78,14 +78,14 @@ fn many(settings: Settings, seeds: u64) -> Tally {
 fn hundreds_of_seeds_and_none_over_a_bound() {
     let seeds = rounds(150, 2000);
     for pace in PACES {
-        assert_clean(&many(Settings { pace, ..Settings::default() }, seeds));
+        assert_clean(&many(FaultSettings { pace, ..FaultSettings::default() }, seeds));
     }
 }
 
 #[test]
 fn random_pairs_of_faults() {
     let seeds = rounds(75, 1000);
-    let tally = many(Settings { pairs: true, ..Settings::default() }, seeds);
+    let tally = many(FaultSettings { pairs: true, ..FaultSettings::default() }, seeds);
     let struck = tally.reactions.values().map(|r| r.runs).sum::<u64>();
     assert!(10 * struck > 19 * seeds, "pairs have two faults: {struck}");
     assert_clean(&tally);
@@ -115,7 +115,7 @@ fn faults_that_hide_each_other_are_off_within_the_slower_bound() {
 
 #[test]
 fn seeds_run_twice_give_equal_hashes_and_replay_to_equal_decisions() {
-    assert_clean(&many(Settings { twice: true, ..Settings::default() }, rounds(12, 100)));
+    assert_clean(&many(FaultSettings { twice: true, ..FaultSettings::default() }, rounds(12, 100)));
 }
 
 /// Negative controls: a core that sleeps, that is deaf, or that trips for a wrong cause, and the bench says

@@ -2,7 +2,7 @@
 //! by its exposure. The finger is the virtual rig's, in virtual time: nobody is vibrated.
 
 use models::SpringSlider;
-use realtime::Cause;
+use realtime::TripCause;
 use runs::job::{Job, Signals, Update};
 use runs::{Event, Outcome, Plan, Setup};
 use std::path::Path;
@@ -98,7 +98,7 @@ fn a_hand_arms_the_rig_and_without_one_it_does_not_arm() {
     assert_eq!((outcome, passes), (Outcome::Complete, planned));
     assert!(events.contains(&Event::Armed) && !events.contains(&Event::NoSecondChannel), "{events:?}");
     let (outcome, passes, ..) = run(&tables, "", false);
-    assert_eq!((outcome, passes), (Outcome::WouldNotArm { blocking: Some(Cause::DeadMan) }, 0));
+    assert_eq!((outcome, passes), (Outcome::WouldNotArm { blocking: Some(TripCause::DeadMan) }, 0));
 }
 
 #[test]
@@ -107,7 +107,7 @@ fn a_sweep_longer_than_its_exposure_is_ended_by_it() {
     // Passes of 0.3 s vibrate, with pauses between that end no go.
     let (outcome, passes, planned, _) = run(&tables, "exposure_max_s = 0.7", true);
     let Outcome::Tripped(trip) = outcome else { panic!("{outcome:?}") };
-    assert_eq!((trip.cause, trip.bound), (Cause::Exposure, 0.7));
+    assert_eq!((trip.cause, trip.bound), (TripCause::Exposure, 0.7));
     assert!(trip.value < 0.705 && passes < planned, "{trip:?}");
 }
 

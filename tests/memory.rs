@@ -3,7 +3,7 @@
 use models::FrictionModel;
 use realtime::compare::Agreement;
 use realtime::{Ports, Row};
-use runs::ambient::{AmbientControl, OperatorAnswers, World};
+use runs::ambient::{AmbientControl, OperatorAnswers, SimulatedAir};
 use runs::plan::{Plan, Resolution};
 use runs::supervisor::{self, Requests, VirtualLoop};
 use runs::{MeasuredPass, Outcome, Setup, Sweep};
@@ -40,7 +40,7 @@ pub fn sweep_in_memory(
     let mut sweep = Sweep::new(points, plan.file.pass, Arc::clone(&model), &setup.tip, setup.file.noise)
         .at_rig(plan, setup);
     let [force, amplifier, stage] = VirtualRig::new(world, seed)?.split();
-    let air = World::Virtual(force.clone());
+    let air = SimulatedAir::Virtual(force.clone());
     let mut ambient_control = AmbientControl::open(&sweep, None, Some(air), OperatorAnswers::Simulated)?;
     let ports = Ports::new(Box::new(force), Box::new(amplifier), Box::new(stage));
     let mut rig = VirtualLoop::new(setup.config, model, ports);

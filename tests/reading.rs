@@ -5,7 +5,7 @@
 //! rig in virtual time and at once with many mu_0; and Eq. 20 itself.
 
 use models::psi::{PsiEq17, relative_friction};
-use models::reading_evidence::{Decision, ReadingFinding, of_passes};
+use models::reading_evidence::{ReadingDecision, ReadingFinding, of_passes};
 use models::{Condition, Finger, PassNoise, PeakToPeak, Reading, SpringSlider, Surrogate};
 use rand_chacha::ChaCha8Rng;
 use rand_chacha::rand_core::{Rng, SeedableRng};
@@ -28,17 +28,20 @@ fn sweeps() -> u64 {
 }
 
 /// Psi* of each nature, and what should be said of it.
-const NATURES: [(f64, Decision); 3] =
-    [(2.38, Decision::PeakToPeak), (1.19, Decision::SineAmplitude), (1.683, Decision::Between)];
+const NATURES: [(f64, ReadingDecision); 3] = [
+    (2.38, ReadingDecision::PeakToPeak),
+    (1.19, ReadingDecision::SineAmplitude),
+    (1.683, ReadingDecision::Between),
+];
 
 /// Psi* of the finite element ridge at the amplitudes of Fig. 12's caption (docs/ridge.md).
 const RIDGES_PSI_STAR: f64 = 1.36;
 /// Multiples of the stroke by which the ridge's plate moves, and what should be said: twice is the first
 /// reading, once the second; the third lies equally far from both.
-const RIDGES: [(f64, Decision); 3] = [
-    (2.0, Decision::PeakToPeak),
-    (1.0, Decision::SineAmplitude),
-    (1.683 / RIDGES_PSI_STAR, Decision::Between),
+const RIDGES: [(f64, ReadingDecision); 3] = [
+    (2.0, ReadingDecision::PeakToPeak),
+    (1.0, ReadingDecision::SineAmplitude),
+    (1.683 / RIDGES_PSI_STAR, ReadingDecision::Between),
 ];
 
 /// How often each decision fell, in the order right, undecided, wrong; and the mean of the nats.
@@ -51,13 +54,13 @@ struct Tally {
     psi_star: f64,
 }
 
-fn tally(expected: Decision, findings: &[ReadingFinding]) -> Tally {
+fn tally(expected: ReadingDecision, findings: &[ReadingFinding]) -> Tally {
     let mut told = Tally::default();
     for f in findings {
         let opposite = match expected {
-            Decision::PeakToPeak => f.decision == Decision::SineAmplitude,
-            Decision::SineAmplitude => f.decision == Decision::PeakToPeak,
-            _ => matches!(f.decision, Decision::PeakToPeak | Decision::SineAmplitude),
+            ReadingDecision::PeakToPeak => f.decision == ReadingDecision::SineAmplitude,
+            ReadingDecision::SineAmplitude => f.decision == ReadingDecision::PeakToPeak,
+            _ => matches!(f.decision, ReadingDecision::PeakToPeak | ReadingDecision::SineAmplitude),
         };
         told.right += usize::from(f.decision == expected);
         told.wrong += usize::from(opposite);
@@ -97,7 +100,7 @@ fn the_plan_decides_on_a_virtual_rig_built_under_either_reading() {
 /// its best exponential lies between, nearer to the second, with stiffnesses that scatter by 5 %.
 #[test]
 fn the_spring_slider_lies_between() {
-    let told = tally(Decision::Between, &on_the_virtual_rig(0.0));
+    let told = tally(ReadingDecision::Between, &on_the_virtual_rig(0.0));
     show("virtual rig, slider on springs", told.psi_star, &told);
     assert!(told.right * 100 >= 50 * sweeps() as usize && (1.3..1.6).contains(&told.psi_star), "{told:?}");
 }
@@ -251,7 +254,7 @@ fn run_diagnose_check_and_point_tell_it() {
 fn what_neither_reading_explains_is_given_to_neither() {
     for psi_star in [0.5, 6.0] {
         let law = |c: &Condition| relative_friction(PsiEq17::at(c, Finger::paper().poisson_ratio), psi_star);
-        let told = tally(Decision::Neither, &swept(law, 3));
+        let told = tally(ReadingDecision::Neither, &swept(law, 3));
         show("Eq. 20, far from both", psi_star, &told);
         assert!(told.right * 100 >= 95 * sweeps() as usize, "{told:?}");
     }
@@ -275,11 +278,11 @@ fn a_bad_pass_does_not_decide_and_mu_0_must_be_known() {
         passes.extend([(at(um, speed), force(&at(um, speed), 2.38)); 2]);
     }
     let before = of(&passes).unwrap();
-    assert_eq!(before.decision, Decision::PeakToPeak);
+    assert_eq!(before.decision, ReadingDecision::PeakToPeak);
     // As it would be under the other reading, and as no law has it.
     for bad in [force(&at(2.0, 0.048), 1.19), 1.0, -1.0] {
         let after = of(&[&passes[..], &[(at(2.0, 0.048), bad)]].concat()).unwrap();
-        assert_ne!(after.decision, Decision::SineAmplitude, "{bad}: {before:?} {after:?}");
+        assert_ne!(after.decision, ReadingDecision::SineAmplitude, "{bad}: {before:?} {after:?}");
     }
     assert_eq!(Reading::ALL.map(|r| r.psi_star().0), [2.38, 1.19]);
 }

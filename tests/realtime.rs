@@ -68,7 +68,7 @@ fn no_allocation_in_a_million_cycles_of_a_sweep() {
 /// a pass.
 #[test]
 fn no_allocation_with_a_law_table() {
-    use models::law_table::grid::Grid;
+    use models::law_table::grid::LawGrid;
     let words = [
         "amplitude_pp_m=0.1e-6..8e-6:9:log",
         "frequency_hz=20e3..60e3:3",
@@ -76,7 +76,7 @@ fn no_allocation_with_a_law_table() {
         "normal_force_n=0.01..2:5:log",
         "mu0=0.05..3:3",
     ];
-    let grid = Grid::parse(words).unwrap();
+    let grid = LawGrid::parse(words).unwrap();
     let mu = |c: &Vec<f64>| [1.0 / (1.0 + c[0] * c[1] * c[4] / c[2]), 0.02];
     let made = grid.table(0, &grid.conditions(0).iter().map(mu).collect::<Vec<_>>()).unwrap();
     let law = runs::model_file::load("own.csv", &made.csv).unwrap();
@@ -312,10 +312,10 @@ fn corrected() -> effects::corrected::Corrected {
 #[test]
 fn the_inverse_meets_what_is_wanted_at_scattered_conditions_without_allocation() {
     use models::inverse::{MOST_EVALUATIONS, Reach, quick};
-    use models::law_table::grid::Grid;
+    use models::law_table::grid::LawGrid;
     use models::{BuiltIn, Condition, FrictionModel, PeakToPeak};
     let finger = Setup::load("virtual").unwrap().tip.finger;
-    let grid = Grid::parse(["amplitude_pp_m=0.05e-6..8e-6:33:log", "speed_m_s=0.004..0.2:9:log"]).unwrap();
+    let grid = LawGrid::parse(["amplitude_pp_m=0.05e-6..8e-6:33:log", "speed_m_s=0.004..0.2:9:log"]).unwrap();
     let mu = |c: &Vec<f64>| [1.0 - (-3.5e-5 * c[1] / c[0]).exp(), 0.02];
     let table = grid.table(0, &grid.conditions(0).iter().map(mu).collect::<Vec<_>>()).unwrap();
     let mut laws: Vec<(String, Arc<dyn FrictionModel>)> =

@@ -1,7 +1,7 @@
 //! Pages as files and over HTTP: what a reader clicks is there, published values are on the axes, and a
 //! window of a record comes as it was recorded.
 
-use runs::report::traces::{Window, within};
+use runs::report::traces::{TraceWindow, within};
 use serde_json::Value;
 use std::collections::BTreeSet;
 use std::io::{BufRead, BufReader, Read, Write};
@@ -285,7 +285,7 @@ fn a_window_of_the_record_comes_as_it_was_recorded_and_to_nobody_else() {
         assert!(unpacked(&trace["t"]).len() <= 100);
     }
     assert_eq!(column(&data, |t| &t["lateral"][1]).iter().flatten().max(), all.iter().max());
-    assert_eq!(within(&out, [1e7, 2e7]).unwrap(), Window { stretch: 1, traces: Vec::new() });
+    assert_eq!(within(&out, [1e7, 2e7]).unwrap(), TraceWindow { stretch: 1, traces: Vec::new() });
     // The guard of every other address, and windows that are none.
     let good = address(from, to);
     for (address, token, more, status) in [

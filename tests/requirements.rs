@@ -3,7 +3,7 @@
 //!
 //! `MUPRIME_UPDATE=1 cargo test --release -p muprime-tests --test requirements` writes it anew.
 
-use realtime::safety::{Cause, RULES, Rule, Unit};
+use realtime::safety::{RULES, Rule, TripCause, Unit};
 use std::collections::{BTreeMap, BTreeSet};
 use std::fmt::Write;
 use studies::validation::faults::scene::STEADY_AT;
@@ -220,7 +220,7 @@ fn the_safety_cases_evidence_exists() {
 
 #[test]
 fn start_up_is_no_rule() {
-    assert!(RULES.iter().all(|r| r.cause != Cause::StartUp));
+    assert!(RULES.iter().all(|r| r.cause != TripCause::StartUp));
 }
 
 /// What `muprime WORDS --help` prints.

@@ -6,7 +6,7 @@ use realtime::cycle::{Command, KEY_AGE, Marker, Phase};
 use realtime::ports::{
     Amplifier, AmplifierState, Contacts, ForceSensor, Forces, Nanos, NoData, SafetyInputs,
 };
-use realtime::safety::{Cause, DriveCommand, Remark, Request};
+use realtime::safety::{DriveCommand, Remark, Request, TripCause};
 use realtime::{Ports, Row};
 use runs::plan::{Plan, Resolution};
 use runs::supervisor::{self, Loop, Requests, VirtualLoop};
@@ -91,7 +91,7 @@ fn a_key_that_is_let_go_switches_off_to_the_cycle() {
     // The key was repeated a moment ago at the latest: nobody holds it from now on.
     let mut rows = (0..1000).map(|_| rig.cycle());
     let off = rows.find(|row| row.tripped.is_some()).expect("a trip within a second");
-    assert_eq!(off.tripped.unwrap().cause, Cause::DeadMan);
+    assert_eq!(off.tripped.unwrap().cause, TripCause::DeadMan);
     let after = off.now.since(last.now);
     assert!(after.0 <= KEY_AGE.0 + 2_000_000 && after.0 >= KEY_AGE.0 - REPEAT.0 - 2_000_000, "{after:?}");
     assert_eq!((off.drive_pp_m, off.velocity_m_s), (0.0, 0.0));
@@ -206,9 +206,12 @@ fn a_pass_with_a_sensor_that_stands_still_does_not_count() {
     let ends = measured.iter().rfind(|(point, _)| *point == third).unwrap().1;
 
     let (passes, events, _, outcome) = stuck([ends - 0.02, f64::MAX], 50);
-    assert!(matches!(outcome, Outcome::Tripped(trip) if trip.cause == Cause::LateralFrozen), "{outcome:?}");
+    assert!(
+        matches!(outcome, Outcome::Tripped(trip) if trip.cause == TripCause::LateralFrozen),
+        "{outcome:?}"
+    );
     assert_eq!(passes.len(), 3, "the pass in which it died counts");
-    let cause = Some(Cause::LateralFrozen);
+    let cause = Some(TripCause::LateralFrozen);
     assert!(events.contains(&Event::PassRepeated { point: third, cause }), "{events:?}");
 
     // No trip: it lives again before so many samples.
@@ -219,7 +222,7 @@ fn a_pass_with_a_sensor_that_stands_still_does_not_count() {
 
     // It stays dead, and no rule notices: the sweep gives up.
     let (passes, _, _, outcome) = stuck([ends - 0.02, f64::MAX], u32::MAX);
-    assert!(matches!(outcome, Outcome::Frozen { cause: Cause::LateralFrozen, .. }), "{outcome:?}");
+    assert!(matches!(outcome, Outcome::Frozen { cause: TripCause::LateralFrozen, .. }), "{outcome:?}");
     assert_eq!(passes.len(), 3);
 }
 

@@ -125,7 +125,7 @@ fn a_trip_is_told_with_its_unit_and_its_remedy() {
         .unwrap();
     let (_, stderr) = texts(&output);
     assert_eq!(output.status.code(), Some(1), "{stderr}");
-    let remedy = realtime::safety::Cause::NormalOverforce.remedy();
+    let remedy = realtime::safety::TripCause::NormalOverforce.remedy();
     let trip = stderr.lines().find(|line| line.starts_with("STOPPED for safety: ")).unwrap_or_default();
     assert!(
         trip.contains("the normal force is beyond its limit: 0.25") && trip.contains("[SR-04]"),

@@ -8,7 +8,7 @@ use models::{Condition, OutOfDomain};
 use realtime::cycle::{Command, CycleState};
 use realtime::cycle_io::{Ports, Tick, run_cycle};
 use realtime::recorder::{Preamble, Recorder};
-use realtime::{Cause, Nanos};
+use realtime::{Nanos, TripCause};
 use runs::plan::{Plan, Resolution};
 use runs::{Outcome, Setup, Sweep};
 use sim::virtual_rig::VirtualRig;
@@ -83,7 +83,7 @@ fn a_day_in_virtual_time_without_a_trip() {
         let tick = Tick { number, lateness: Nanos(0), now };
         let row = run_cycle(&config, &*model, &mut state, &mut ports, &mut || queue.pop_front(), tick);
         // Every sweep ends with a stop, which latches as it must; nothing else does.
-        let stopped = std::mem::take(&mut ended).then_some(Cause::Stopped);
+        let stopped = std::mem::take(&mut ended).then_some(TripCause::Stopped);
         assert_eq!(row.tripped.map(|t| t.cause), stopped, "after {:.3} s", now.seconds());
         if number.is_multiple_of(DECIMATED) {
             recorder.row(&row).unwrap();

@@ -4,7 +4,7 @@ use calibration::finger::springs::{Springs, springs};
 use models::{Pass, PeakToPeak, SpringSlider};
 use rayon::prelude::*;
 use runs::{Outcome, Plan, Setup};
-use sim::finger::Finger;
+use sim::finger::VirtualFinger;
 use sim::world::WorldConfig;
 use std::sync::Arc;
 use tests::memory::sweep_in_memory;
@@ -25,7 +25,7 @@ fn swept(sweeps: u64, world: &WorldConfig) -> Vec<(Vec<Pass>, f64)> {
             let run =
                 sweep_in_memory(&setup, &plan, seed, world, Arc::clone(&model) as _, &mut |_| {}).unwrap();
             assert_eq!(run.outcome, Outcome::Complete);
-            let finger = Finger::new(&world.finger, seed);
+            let finger = VirtualFinger::new(&world.finger, seed);
             let truth = finger.lateral_stiffness_n_per_m / finger.normal_stiffness_n_per_m;
             (run.passes.into_iter().map(|p| p.pass).collect(), truth)
         })

@@ -74,13 +74,13 @@ fn check(points: &[AmplitudePoint], what: &'static str, needed: usize) -> Result
     Ok(())
 }
 
+/// A fit, or why there is none.
+type FitResult = Result<Fit, FitError>;
+
 /// A fit to amplitudes over their scatter: up to a factor, proportional to the amplitude (speckle, drive)
 /// above a floor of a fifth of the largest (noise of the vibrometer). The scatter is that of the fitted curve:
 /// by the measured amplitudes, those that scattered low would weigh more.
-fn weighted(
-    points: &[AmplitudePoint],
-    fit: impl Fn(&[f64]) -> Result<Fit, FitError>,
-) -> Result<Fit, FitError> {
+fn weighted(points: &[AmplitudePoint], fit: impl Fn(&[f64]) -> FitResult) -> FitResult {
     let scatter = |curve: Vec<f64>| -> Vec<f64> {
         let largest = curve.iter().fold(0f64, |m, w| m.max(w.abs()));
         curve.iter().map(|w| w.hypot(0.2 * largest)).collect()

@@ -10,9 +10,8 @@ mod verbs;
 
 use clap::error::ErrorKind;
 use clap::{CommandFactory, FromArgMatches, Parser, Subcommand};
-use runs::print::{Remarks, answer_json};
-use runs::version;
-use runs::{out, say};
+use runs::print::{LogWriter, answer_json};
+use runs::{out, say, version};
 use serde_json::json;
 use std::io::IsTerminal;
 use std::process::ExitCode;
@@ -178,7 +177,7 @@ fn ended() -> ExitCode {
     };
     let colours = std::io::stderr().is_terminal();
     tracing_subscriber::registry()
-        .with(tracing_subscriber::fmt::layer().with_ansi(colours).with_writer(|| Remarks))
+        .with(tracing_subscriber::fmt::layer().with_ansi(colours).with_writer(|| LogWriter))
         .with(filter)
         .init();
     runs::setup::look_in(cli.profiles);

@@ -13,7 +13,7 @@ pub use value::Value;
 
 /// The stage of a diagnosis at which a constant enters.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub enum Stage {
+pub enum EntersAt {
     /// The fits and evidences of all hypotheses, and all that follows.
     Fit,
     /// The verdict rule, from finished fits.
@@ -24,11 +24,11 @@ pub enum Stage {
 
 /// One constant as the table shows it.
 #[derive(Debug, Clone, PartialEq)]
-pub struct Row {
+pub struct ConstantRow {
     /// Name.
     pub name: &'static str,
     /// Stage at which it enters.
-    pub stage: Stage,
+    pub stage: EntersAt,
     /// Value or values.
     pub values: Vec<f64>,
     /// Meaning, with its unit.
@@ -65,10 +65,10 @@ macro_rules! constants {
 
         impl Constants {
             /// Every constant with its present value.
-            pub fn rows(&self) -> Vec<Row> {
-                vec![$($(Row {
+            pub fn rows(&self) -> Vec<ConstantRow> {
+                vec![$($(ConstantRow {
                     name: stringify!($name),
-                    stage: Stage::$stage,
+                    stage: EntersAt::$stage,
                     values: self.$name.numbers(),
                     meaning: $meaning,
                     source: $source,
@@ -99,10 +99,10 @@ const LEADERS: &str = "development: 184 leading single causes of two generators,
 
 constants! {
     Fit {
-    prior_null: f64 = 0.5, "Prior probability of no gap.", "a gap is as likely as none (indifference)";
+    prior_no_gap: f64 = 0.5, "Prior probability of no gap.", "a gap is as likely as none (indifference)";
     prior_single: f64 = 0.36, "Prior probability of one cause of the library, shared evenly by the testable ones.", JUDGEMENT;
     prior_pair: f64 = 0.07, "Prior probability of two causes, shared evenly by their pairs.", JUDGEMENT;
-    prior_open: f64 = 0.07, "Prior probability of the open set.", JUDGEMENT;
+    prior_open_set: f64 = 0.07, "Prior probability of the open set.", JUDGEMENT;
     structure_share: f64 = 0.5, "Share of the open set's weight for departures that are sudden, periodic or local.", JUDGEMENT;
     structure_asked_nats: f64 = 10.0, "Nats behind the best hypothesis up to which the structure of no gap is searched.", NUMERICAL;
     unlisted_share: f64 = 0.1, "Share of the open set's smooth part for causes of known form that the library does not name.", JUDGEMENT;

@@ -75,15 +75,15 @@ const ROUNDS: [usize; 2] = [15, 10];
 /// Fits every hypothesis to a table.
 pub fn fit_all(table: &Table, rig: &RigFile, options: &Options) -> Fitted {
     let k = &options.constants;
-    let lasting = fit_believing(table, rig, options, &Belief::Judged);
-    let ahead = lasting.best_evidence() - lasting.evidence[0];
+    let lasting = fit_believing(table, rig, options, &Belief::ByResidual);
+    let ahead = lasting.best_evidence() - lasting.no_gap_evidence;
     if lasting.scatter.slow[0] == 0.0 || ahead < k.pairs_from_nats {
         return lasting;
     }
     // A cause that no surface follows leaves what looks like scatter that lasts. Whether it is shows in the best hypothesis.
     let mut alone = options.clone();
     Arc::make_mut(&mut alone.constants).slow_nats = f64::INFINITY;
-    let mut independent = fit_believing(table, rig, &alone, &Belief::Judged);
+    let mut independent = fit_believing(table, rig, &alone, &Belief::ByResidual);
     independent.problem.constants = options.constants.clone();
     let better = independent.best_evidence() + lasting.scatter.slow_cost > lasting.best_evidence();
     if better { independent } else { lasting }
@@ -96,41 +96,42 @@ pub fn fit_believing(table: &Table, rig: &RigFile, options: &Options, belief: &B
     let mut problem = Problem::new(table, rig, &options.constants).on(options.law.as_ref());
     let (discrepancy, pure, scatter) = settle(table, rig, &mut problem, belief);
 
-    let baseline = minimise(&problem, &[], &[0.0; NUISANCES], &problem.variance, ROUNDS[0]);
+    let start = minimise(&problem, &[], &[0.0; NUISANCES], &problem.variance, ROUNDS[0]);
     let basis = Basis::none(problem.len());
-    let (none_evidence, none) = averaged_over_form(&problem, &baseline.u, &[], &basis);
-    let gap = &discrepancy.smooth - &none.prediction;
-    let loose = tempered(&problem, &gap, k.start_share);
-    let nuisances = minimise(&problem, &[], &none.u, &loose, ROUNDS[1]).u;
+    let (no_gap_evidence, baseline) = averaged_over_form(&problem, &start.u, &[], &basis);
+    let gap = &discrepancy.smooth - &baseline.prediction;
+    let tempered = tempered(&problem, &gap, k.start_share);
+    let nuisances = minimise(&problem, &[], &baseline.u, &tempered, ROUNDS[1]).u;
 
     let (tried, not_testable) = testable(&problem, table, rig, options);
     problem.own = tried.iter().copied().filter(|e| options.own.contains(e)).collect();
     let known: Vec<usize> = tried.iter().copied().chain(library().len()..effects::known().len()).collect();
     let kernels = Kernels::on(&problem, table, &known);
     let basis = kernels.at(&problem.passes);
-    let search = Search { nuisances: &nuisances, loose: &loose, basis: &basis, progress };
+    let search = Search { nuisances: &nuisances, tempered: &tempered, basis: &basis, progress };
     let mut candidates = singles(&problem, table, &tried, &search);
     let lapsed = lapsed(&mut problem, table, &mut candidates, &search);
     sort(&mut candidates);
     let leading = |candidates: &[Candidate]| {
         let mut list: Vec<_> =
-            candidates.iter().map(|c| (c.names(), c.log_evidence - none_evidence)).collect();
+            candidates.iter().map(|c| (c.names(), c.log_evidence - no_gap_evidence)).collect();
         list.sort_by(|a, b| b.1.total_cmp(&a.1));
         list
     };
     progress.with("causes that the library does not name", SINGLES_END, || leading(&candidates));
-    let leader = candidates.first().filter(|c| c.log_evidence > none_evidence + k.pairs_from_nats);
-    let gap = leader.is_some() || discrepancy.log_evidence > none_evidence + k.pairs_from_nats;
-    if let (Belief::Judged, true, Some(other)) =
-        (belief, gap, scatter.about_baseline(&problem, &none.prediction))
+    let worth_pairs = |log_evidence: f64| log_evidence > no_gap_evidence + k.pairs_from_nats;
+    let leader = candidates.first().filter(|c| worth_pairs(c.log_evidence));
+    let gap = leader.is_some() || worth_pairs(discrepancy.log_evidence);
+    if let (Belief::ByResidual, true, Some(other)) =
+        (belief, gap, scatter.about_baseline(&problem, &baseline.prediction))
     {
         // Where a few passes that lie apart are all that the baseline does not explain, they are no gap.
         let without = fit_believing(table, rig, options, &other);
-        if without.none_probability > 0.5 {
+        if without.no_gap_probability > 0.5 {
             return without;
         }
     }
-    if let (Belief::Judged, Some(leader)) = (belief, leader) {
+    if let (Belief::ByResidual, Some(leader)) = (belief, leader) {
         let departure = leader.best.departure_n(&basis);
         if let Some(other) = scatter.about_mean(&problem, &(&leader.best.prediction + departure)) {
             return fit_believing(table, rig, options, &other);
@@ -138,8 +139,7 @@ pub fn fit_believing(table: &Table, rig: &RigFile, options: &Options, belief: &B
     }
     let unlisted = unlisted(&problem, table, &search);
 
-    if options.pairs && candidates.first().is_some_and(|c| c.log_evidence > none_evidence + k.pairs_from_nats)
-    {
+    if options.pairs && candidates.first().is_some_and(|c| worth_pairs(c.log_evidence)) {
         progress.with("pairs of effects", 0.6, || leading(&candidates));
         let companions = second_causes(&problem, &candidates, &lapsed, &search, discrepancy.log_evidence);
         sought_again(&problem, &mut candidates, &companions, &search);
@@ -155,20 +155,21 @@ pub fn fit_believing(table: &Table, rig: &RigFile, options: &Options, belief: &B
     let smooth = log_sum_exp(&open);
     let top = candidates.iter().map(|c| c.log_evidence).fold(smooth, f64::max);
     let structure =
-        if none_evidence > top - k.structure_asked_nats { structure(&problem, &none) } else { None };
-    let shapes = shapes::shapes(&problem, &none, &scatter);
+        if no_gap_evidence > top - k.structure_asked_nats { structure(&problem, &baseline) } else { None };
+    let shapes = shapes::shapes(&problem, &baseline, &scatter);
     let mut fitted = Fitted {
         shapes,
         problem,
         pure,
         scatter,
-        none,
-        none_probability: 0.0,
+        baseline,
+        no_gap_probability: 0.0,
         discrepancy,
         unlisted,
         structure,
-        unknown_probability: 0.0,
-        evidence: [none_evidence, smooth],
+        open_set_probability: 0.0,
+        no_gap_evidence,
+        smooth_evidence: log_sum_exp(&open),
         tried: tried.len(),
         candidates,
         unweighed,
@@ -205,7 +206,7 @@ fn testable(
 
 /// What the leading cause explains after all belongs; it counted for little, and is not called suspect.
 fn clear_explained(fitted: &mut Fitted) {
-    let surest = fitted.none_probability.max(fitted.unknown_probability);
+    let surest = fitted.no_gap_probability.max(fitted.open_set_probability);
     let Some(c) = fitted.candidates.first().filter(|c| c.probability > surest) else { return };
     let (problem, inflation) = (&fitted.problem, &fitted.scatter.inflation);
     let explains = |row: usize| {
@@ -260,8 +261,7 @@ fn certified(effect: &Effect, rig: &RigFile) -> Option<String> {
 /// The members of the best pairs once more, each from where the pair has it: a single cause that was sought
 /// in vain must not lose to a pair of which the second member does nothing.
 fn sought_again(problem: &Problem, singles: &mut [Candidate], pairs: &[Candidate], search: &Search<'_>) {
-    let mut ahead: Vec<&Candidate> =
-        pairs.iter().filter(|p| p.log_evidence > singles[0].log_evidence).collect();
+    let mut ahead: Vec<_> = pairs.iter().filter(|p| p.log_evidence > singles[0].log_evidence).collect();
     ahead.sort_by(|a, b| b.log_evidence.total_cmp(&a.log_evidence).then(a.effects.cmp(&b.effects)));
     ahead.truncate(problem.constants.pairs_searched);
     let again: Vec<(f64, Posterior)> = ahead
@@ -273,7 +273,7 @@ fn sought_again(problem: &Problem, singles: &mut [Candidate], pairs: &[Candidate
                 .map(move |i| (pair.best.members[i], [&u[..NUISANCES], &u[layout.member(i)]].concat()))
         })
         .map(|(member, u)| {
-            let fit = minimise(problem, &[member], &u, search.loose, ROUNDS[1]);
+            let fit = minimise(problem, &[member], &u, search.tempered, ROUNDS[1]);
             averaged_over_form(problem, &fit.u, &[member], search.basis)
         })
         .collect();
@@ -302,7 +302,7 @@ fn second_causes(
     if misfit <= n + k.misfit_sd * (2.0 * n).sqrt() && behind < k.pairs_from_nats {
         return Vec::new();
     }
-    let mut grown = pairs(problem, singles, search.loose, search.basis);
+    let mut grown = pairs(problem, singles, search.tempered, search.basis);
     for pair in &mut grown {
         // A pair pays for the certificates that it frees as its members do alone.
         let freed = pair.effects.iter().filter(|e| lapsed.contains(e)).count();

@@ -5,7 +5,7 @@ use std::sync::Arc;
 
 /// A stage that was reached.
 #[derive(Clone, Debug, PartialEq)]
-pub struct Stage {
+pub struct ProgressReport {
     /// What is being done.
     pub doing: &'static str,
     /// Share of the work that is done, 0 to 1; a second look at the table begins anew.
@@ -17,7 +17,7 @@ pub struct Stage {
 
 /// The receiver of the stages; none by default.
 #[derive(Clone, Default)]
-pub struct Progress(Option<Arc<dyn Fn(Stage) + Send + Sync>>);
+pub struct Progress(Option<Arc<dyn Fn(ProgressReport) + Send + Sync>>);
 
 impl fmt::Debug for Progress {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
@@ -27,7 +27,7 @@ impl fmt::Debug for Progress {
 
 impl Progress {
     /// Calls `receiver` at each stage, from any thread.
-    pub fn to(receiver: impl Fn(Stage) + Send + Sync + 'static) -> Self {
+    pub fn to(receiver: impl Fn(ProgressReport) + Send + Sync + 'static) -> Self {
         Progress(Some(Arc::new(receiver)))
     }
 
@@ -44,7 +44,7 @@ impl Progress {
         leading: impl FnOnce() -> Vec<(Vec<&'static str>, f64)>,
     ) {
         if let Some(receiver) = &self.0 {
-            receiver(Stage { doing, share, leading: leading() });
+            receiver(ProgressReport { doing, share, leading: leading() });
         }
     }
 }

@@ -27,7 +27,7 @@ use crate::hypotheses::{Fitted, Options, fit_all};
 use crate::report::describe::{Description, at_least, description, not_named};
 use crate::report::format::{plain, probability};
 use crate::report::intervals::{Estimate, curvature, estimates};
-use crate::report::locate::{Region, ledger, regions};
+use crate::report::locate::{GapRegion, ledger, regions};
 use crate::report::new_run::widened;
 use crate::report::next::{Experiment, experiments};
 use crate::report::power::{SeenFrom, seen_from};
@@ -36,7 +36,7 @@ use crate::report::pulls::{Pull, pulls};
 use crate::report::remarks::{of_scatter, of_table};
 use crate::report::run_shifts::shifted;
 use crate::report::shrinkage::{HeldOutError, held_out_error};
-use crate::report::timing::{Comparison, RecordPart};
+use crate::report::timing::{RecordPart, TimingComparison};
 use crate::report::unstated_covariates::{Unstated, unstated};
 use crate::report::with_suspects::{WithSuspects, with_suspects};
 use crate::scatter::{PureError, Scatter};
@@ -69,7 +69,7 @@ pub struct Where {
     /// Probability by place.
     pub place: BTreeMap<&'static str, f64>,
     /// Parts of the operating space.
-    pub regions: Vec<Region>,
+    pub regions: Vec<GapRegion>,
 }
 
 /// An effect that the table cannot show.
@@ -222,11 +222,11 @@ pub fn diagnose(table: &Table, rig: &RigFile, options: &Options, sha256: String)
     remarks.extend(of_table(&fitted, table, &decision));
     remarks.extend(of_scatter(&fitted, &decision, with_suspects.as_ref()));
     let holds = match decision.verdict {
-        Verdict::NoGap => Some(&fitted.none),
+        Verdict::NoGap => Some(&fitted.baseline),
         Verdict::Named | Verdict::Ambiguous => best,
         Verdict::Unknown => None,
     };
-    let pulls = |model| pulls(&fitted.problem, &fitted.none, model);
+    let pulls = |model| pulls(&fitted.problem, &fitted.baseline, model);
     let stiffness_pulls = holds.map_or_else(Vec::new, pulls);
     let seen_from = if decision.verdict == Verdict::NoGap { seen_from(&fitted) } else { Vec::new() };
     remarks.extend(gap.remark());
@@ -294,9 +294,9 @@ fn sentence(fitted: &Fitted, decision: &Decision, gap: &HeldOutError, answer: &P
     let leader = decision.leader().unwrap_or_default();
     let words = |candidate: usize| plain(&label(fitted, candidate));
     match decision.verdict {
-        Verdict::NoGap if decision.none < 0.5 => format!(
+        Verdict::NoGap if decision.no_gap < 0.5 => format!(
             "No gap is shown: the recalibrated model may explain the table (probability {}).",
-            probability(decision.none)
+            probability(decision.no_gap)
         ),
         Verdict::NoGap => "No gap: the recalibrated model explains the table.".to_string(),
         Verdict::Named => format!(
@@ -380,7 +380,7 @@ fn hypotheses(
         .collect();
     let names = |pair: &[usize]| pair.iter().map(|&e| effects::at(e).name.to_string()).collect();
     let unweighed = fitted.unweighed.iter().zip(&decision.unweighed).filter(|(_, p)| **p > LISTED);
-    let others = [(Vec::new(), decision.none), (vec!["unknown".to_string()], decision.unknown)];
+    let others = [(Vec::new(), decision.no_gap), (vec!["unknown".to_string()], decision.open_set)];
     let others = others.into_iter().chain(unweighed.map(|(pair, p)| (names(pair), *p)));
     for (effects, probability) in others {
         list.push(Hypothesis {
@@ -411,7 +411,7 @@ impl Diagnosis {
         }
         // The first sentences are of the passes alone, and may say 'no gap' beside it.
         let late = part.comparisons.iter().filter(|c| !c.causes.is_empty());
-        let odds = |c: &&Comparison| c.log10_odds_vs_none.unwrap_or_default();
+        let odds = |c: &&TimingComparison| c.log10_odds_vs_none.unwrap_or_default();
         if let Some(late) = late.max_by(|a, b| odds(a).total_cmp(&odds(b))) {
             let causes = late.causes.join(" or ").replace('_', " ");
             let late_ms = 1e3 * late.late_s.unwrap_or_default();

@@ -27,7 +27,7 @@ use crate::regression::{Problem, beside_each_other, lengths};
 use nalgebra::{DMatrix, DVector};
 use rayon::prelude::*;
 use serde::Serialize;
-use surface::{State, Surface};
+use surface::{ScatterSurface, State};
 
 /// A pass that does not belong to the rest of its table.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize, schemars::JsonSchema)]
@@ -111,7 +111,7 @@ const WORTH: f64 = 2.0;
 #[derive(Debug, Clone, PartialEq)]
 pub enum Belief {
     /// Each by its residual about a surface that did not see it.
-    Judged,
+    ByResidual,
     /// All.
     All,
     /// By residuals about the mean of a leading cause or of the baseline, and what follows from them.
@@ -138,8 +138,8 @@ pub fn estimate(
 ) -> Scatter {
     let k = &*problem.constants;
     let n = problem.len();
-    let surfaces: Vec<Surface> =
-        lengths(k, table).into_par_iter().map(|l| Surface::new(table, problem, center, l)).collect();
+    let surfaces: Vec<ScatterSurface> =
+        lengths(k, table).into_par_iter().map(|l| ScatterSurface::new(table, problem, center, l)).collect();
     let start = State::start(table.run_count > 1).within(&lasting::bounds(k, table));
     let under = problem.predict(&[], center).as_slice().to_vec();
     let mut level = under.clone();
@@ -161,8 +161,8 @@ pub fn estimate(
         let seen = surfaces[best].seen(&variance, &weight, &level, &state);
         let judged = || suspects::weights(k, &suspects::responsibilities(k, &seen.left_out), &seen.left_out);
         let next = match belief {
-            Belief::Judged if round < HEAVY => suspects::heavy(&seen.left_out),
-            Belief::Judged => judged(),
+            Belief::ByResidual if round < HEAVY => suspects::heavy(&seen.left_out),
+            Belief::ByResidual => judged(),
             _ => weight.clone(),
         };
         let moved = next.iter().zip(&weight).map(|(a, b)| (a - b).abs()).fold(0.0, f64::max);
@@ -176,7 +176,7 @@ pub fn estimate(
     let seen = surface.seen(&variance, &weight, &level, &state);
     let space = clusters::Space::of(problem);
     let (deviations, outside, together_in) = match belief {
-        Belief::Judged => {
+        Belief::ByResidual => {
             let mut outside = suspects::responsibilities(k, &seen.left_out);
             let place = suspects::take_back(problem, &space, &mut outside, &seen.left_out);
             (seen.left_out, outside, place)

@@ -10,7 +10,7 @@ use super::modbus_tcp::{Tcp, resolve};
 use super::{InstrumentSetup, LinkError, OpenError};
 use instruments::Profile;
 use instruments::schema::{LinkKind, Role};
-use realtime::Clock;
+use realtime::{Clock, threads};
 use std::net::SocketAddr;
 use std::sync::atomic::{AtomicBool, Ordering};
 use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
@@ -96,7 +96,7 @@ impl Chamber {
         let stop = Arc::new(AtomicBool::new(false));
         let (theirs, ends) = (Arc::clone(&shared), Arc::clone(&stop));
         let work = move || talk.go_on((&runtime, &clock), &theirs, &ends);
-        let thread = std::thread::Builder::new().name("chamber".into()).spawn(work);
+        let thread = threads::spawn("chamber", work);
         Ok(Self { shared, stop, thread: Some(thread.map_err(|error| at(error.into()))?) })
     }
 

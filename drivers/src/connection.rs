@@ -128,7 +128,7 @@ impl Connection {
         // At the level of the terminal's default, so that what is shown has its instrument.
         let span = tracing::warn_span!("instrument", id = self.endpoint.profile().id());
         let run = move || span.in_scope(|| self.keep_up(&mut converse));
-        std::thread::Builder::new().name(name).spawn(run).map_err(LinkError::from)
+        realtime::threads::spawn(name, run).map_err(LinkError::from)
     }
 
     fn keep_up(

@@ -5,11 +5,10 @@
 //! is formatted; the threads of the links write it, the loop has none of it.
 
 use instruments::{CanEvent, CanFrame, CanPort};
-use std::fmt;
-use std::io;
 use std::pin::Pin;
 use std::task::{Context, Poll};
 use std::time::Instant;
+use std::{fmt, io};
 use tokio::io::{AsyncRead, AsyncWrite, ReadBuf};
 
 /// Bytes in hexadecimal and as text.

@@ -48,7 +48,7 @@ impl VibrometerSetup {
 
 /// What a controller says of the decoder that is read.
 #[derive(Debug, Clone, PartialEq, Serialize)]
-pub struct Settings {
+pub struct VibrometerSettings {
     /// Name of the decoder.
     pub decoder: String,
     /// Its number in this instrument.
@@ -63,7 +63,7 @@ pub struct Settings {
     pub decoders: Vec<String>,
 }
 
-impl Settings {
+impl VibrometerSettings {
     /// The decoder, as the calibrations take it.
     pub fn decoder(&self) -> Decoder {
         Decoder {
@@ -83,7 +83,7 @@ impl Settings {
     }
 }
 
-impl std::fmt::Display for Settings {
+impl std::fmt::Display for VibrometerSettings {
     fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
         write!(
             f,
@@ -115,7 +115,7 @@ pub struct BeyondBand {
 /// # Errors
 /// A profile that is not a vibrometer's, a line that cannot be opened, a decoder that is not there, answers
 /// that make no sense, settings that changed while they were read.
-pub fn settings(setup: &VibrometerSetup) -> Result<Settings, OpenError> {
+pub fn settings(setup: &VibrometerSetup) -> Result<VibrometerSettings, OpenError> {
     let profile = setup.description()?;
     let link = profile.description.link.clone();
     let (LinkKind::Serial, Some(choice)) = (link.kind, link.choice.clone()) else {
@@ -215,7 +215,7 @@ impl Talk {
         profile: &Profile,
         number: u8,
         decoders: &[String],
-    ) -> Result<Settings, LinkError> {
+    ) -> Result<VibrometerSettings, LinkError> {
         let mut values = profile.values();
         for (frame, query) in profile.queries() {
             let question = query.send.replace("{which}", &number.to_string());
@@ -236,7 +236,7 @@ impl Talk {
                 Some(why) => Err(LinkError::Refused(format!("{name} = {}: {why:?}", values.get(signal)))),
             }
         };
-        Ok(Settings {
+        Ok(VibrometerSettings {
             decoder: decoders[usize::from(number)].clone(),
             number,
             range_m_s_per_v: value("range")?,
@@ -268,7 +268,7 @@ mod tests {
 
     #[test]
     fn a_frequency_beyond_the_band_is_told() {
-        let settings = Settings {
+        let settings = VibrometerSettings {
             decoder: "VD-09".into(),
             number: 0,
             range_m_s_per_v: 0.1,

@@ -1,7 +1,7 @@
 //! A profile as a page for people, generated so that it cannot drift from what the drivers do.
 
 use crate::profile::{Frame, FrameKind, Span};
-use crate::schema::{Description, Init, Link, LinkKind, Severity, Stamp, Verified};
+use crate::schema::{Description, Init, Link, LinkKind, ProfileEvidence, Severity, Stamp};
 use crate::{Profile, SignalId};
 use std::fmt::Write;
 
@@ -12,9 +12,9 @@ pub fn markdown(profile: &Profile) -> String {
     let roles = d.profile.roles.iter().map(spaced).collect::<Vec<_>>().join(", ");
     let (maker, models) = (&d.profile.maker, d.profile.models.join(", "));
     let tried = match d.profile.verified {
-        Verified::EmulatorOnly => "against emulators and independent programs, never on hardware",
-        Verified::Bench => "on a bench",
-        Verified::Published => "on a bench, with published results",
+        ProfileEvidence::EmulatorOnly => "against emulators and independent programs, never on hardware",
+        ProfileEvidence::Bench => "on a bench",
+        ProfileEvidence::Published => "on a bench, with published results",
     };
     let _ = writeln!(page, "{maker}: {models}. Roles: {roles}. Tried {tried}.");
     let firmware = d.profile.firmware.as_ref().map(|firmware| format!("Firmware: {firmware}."));

@@ -16,7 +16,7 @@ mod trial;
 mod values;
 
 pub use frames::{CheckOrder, Init, Message, Poll, Query, Stream, Table, Write};
-pub use header::{Header, Role, Verified};
+pub use header::{Header, ProfileEvidence, Role};
 pub use link::{Choice, ErrorQuery, Link, LinkKind};
 pub use state::{Fault, Severity, Signature, Stamp, Time};
 pub use trial::{Emulator, Vector};

@@ -46,7 +46,7 @@ proptest! {
         let _ = modbus_rtu::written(&modbus_rtu::write(9, 410, &[1]), &bytes);
         let _ = modbus_rtu::hear(&bytes, &[0x46, 0x6A]);
         for (sync, length, check) in [(vec![0x20, 0x4E], 16, Check::CRC_16_MODBUS), (vec![], 13, Check::Sum7WithErrorBit)] {
-            let mut cutter = stream::Cutter::new(stream::Shape { sync, length, check, check_from: 0, check_high_first: None, believed_after: 2 });
+            let mut cutter = stream::Cutter::new(stream::FrameShape { sync, length, check, check_from: 0, check_high_first: None, believed_after: 2 });
             let mut frames = 0;
             cutter.push(&bytes, |_| frames += 1);
             prop_assert!(frames * length <= bytes.len());

@@ -4,7 +4,7 @@
 
 use muprime_models::inverse::quick;
 use muprime_models::law_table::LawTable;
-use muprime_models::law_table::grid::Grid;
+use muprime_models::law_table::grid::LawGrid;
 use muprime_models::prediction::{EmpiricalPsi, FrictionModel, SpringSlider};
 use muprime_models::spring_slider::{half_contact_angle_rad, solve};
 use muprime_models::{Condition, Finger, PeakToPeak, Surrogate};
@@ -42,7 +42,7 @@ fn spring_slider_in_five_solutions(bencher: divan::Bencher) {
 fn table() -> LawTable {
     let words =
         ["amplitude_pp_m=0.2e-6..6e-6:25:log", "frequency_hz=20e3..60e3:5", "speed_m_s=0.002..0.2:13:log"];
-    let grid = Grid::parse(words.into_iter().chain(["normal_force_n=0.1..1:7:log", "mu0=0.2..1:3"]))
+    let grid = LawGrid::parse(words.into_iter().chain(["normal_force_n=0.1..1:7:log", "mu0=0.2..1:3"]))
         .expect("a grid");
     let mu = |c: &Vec<f64>| [1.0 / (1.0 + c[0] * c[1] * c[4] / c[2]), 0.02];
     let answers: Vec<_> = grid.conditions(0).iter().map(mu).collect();

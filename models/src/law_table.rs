@@ -113,7 +113,7 @@ pub struct LawTableError {
 }
 
 #[derive(Clone, Debug)]
-struct Axis {
+struct LawAxis {
     variable: &'static Variable,
     nodes: Vec<f64>,
     stride: usize,
@@ -122,7 +122,7 @@ struct Axis {
 /// The table, ready to be read.
 #[derive(Clone, Debug)]
 pub struct LawTable {
-    axes: Vec<Axis>,
+    axes: Vec<LawAxis>,
     /// mu' and its standard uncertainty, the last axis fastest.
     values: Vec<[f64; 2]>,
 }
@@ -191,10 +191,10 @@ impl LawTable {
             let problem = format!("the column '{}' is missing", of.columns[0].0);
             return Err(bad(head, problem, format!("add it: {}", of.meaning)));
         }
-        let mut axes: Vec<Axis> = VARIABLES
+        let mut axes: Vec<LawAxis> = VARIABLES
             .iter()
             .filter(|v| header.iter().any(|h| h == v.name))
-            .map(|variable| Axis { variable, nodes: Vec::new(), stride: 1 })
+            .map(|variable| LawAxis { variable, nodes: Vec::new(), stride: 1 })
             .collect();
         let mut rows: Vec<(u64, [f64; VARIABLES.len()], [f64; 2])> = Vec::new();
         for record in reader.records() {
@@ -248,7 +248,7 @@ impl LawTable {
     }
 
     fn filled(
-        mut axes: Vec<Axis>,
+        mut axes: Vec<LawAxis>,
         rows: &[(u64, [f64; VARIABLES.len()], [f64; 2])],
         head: u64,
     ) -> Result<LawTable, LawTableError> {
@@ -266,7 +266,7 @@ impl LawTable {
         let mut values = vec![[f64::NAN; 2]; size];
         let mut lines = vec![0_u64; size];
         for (line, at, answer) in rows {
-            let place = |(axis, v): (&Axis, &f64)| {
+            let place = |(axis, v): (&LawAxis, &f64)| {
                 axis.stride * axis.nodes.binary_search_by(|n| n.total_cmp(v)).unwrap_or_default()
             };
             let index: usize = axes.iter().zip(at).map(place).sum();
@@ -277,8 +277,9 @@ impl LawTable {
             (lines[index], values[index]) = (*line, *answer);
         }
         if let Some(missing) = lines.iter().position(|line| *line == 0) {
-            let at =
-                |a: &Axis| format!("{} = {}", a.variable.name, a.nodes[missing / a.stride % a.nodes.len()]);
+            let at = |a: &LawAxis| {
+                format!("{} = {}", a.variable.name, a.nodes[missing / a.stride % a.nodes.len()])
+            };
             let place: Vec<String> = axes.iter().map(at).collect();
             return Err(bad(head, shape, format!("add the row for {}, and any other", place.join(", "))));
         }

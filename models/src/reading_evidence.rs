@@ -21,7 +21,7 @@ const RESOLVED_SD: f64 = 0.25;
 /// What the passes say of the readings.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize, schemars::JsonSchema)]
 #[serde(rename_all = "snake_case")]
-pub enum Decision {
+pub enum ReadingDecision {
     /// `w` is the whole stroke.
     PeakToPeak,
     /// `w` is the sine's amplitude.
@@ -38,7 +38,7 @@ pub enum Decision {
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize, schemars::JsonSchema)]
 pub struct ReadingFinding {
     /// The conclusion.
-    pub decision: Decision,
+    pub decision: ReadingDecision,
     /// Natural logarithm of the evidence for peak-to-peak over that for the sine's amplitude: negative favours the latter.
     pub nats: f64,
     /// Natural logarithm of the evidence for any other `Psi*` over that for the better of the two readings.
@@ -70,17 +70,17 @@ impl fmt::Display for ReadingFinding {
             self.passes_high.map_or("any more".into(), |high| format!("{high:.2}"))
         )?;
         match self.decision {
-            Decision::PeakToPeak => {
+            ReadingDecision::PeakToPeak => {
                 write!(f, "The paper's 2.38 fits, if its w is peak-to-peak ({})", likelier(nats))
             }
-            Decision::SineAmplitude => {
+            ReadingDecision::SineAmplitude => {
                 write!(f, "The paper's 1.19 fits, if its w is the amplitude of a sine ({})", likelier(nats))
             }
-            Decision::Between => {
+            ReadingDecision::Between => {
                 f.write_str("It lies between 1.19 and 2.38 and supports neither reading of the paper's w")
             }
-            Decision::Neither => f.write_str("Neither reading of the paper's w fits (Psi* 2.38 or 1.19)"),
-            Decision::TooLittle => f.write_str(
+            ReadingDecision::Neither => f.write_str("Neither reading of the paper's w fits (Psi* 2.38 or 1.19)"),
+            ReadingDecision::TooLittle => f.write_str(
                 "The data support no reading of the paper's w (Psi* 2.38 or 1.19): run the plan 'psi-reading'",
             ),
         }
@@ -123,7 +123,7 @@ pub fn of_passes(
 }
 
 /// The conclusion on the readings where `ln Psi*` is known within a variance, and the two logarithms of odds.
-fn decide(ln_star: f64, variance: f64) -> (Decision, f64, f64) {
+fn decide(ln_star: f64, variance: f64) -> (ReadingDecision, f64, f64) {
     let normal = |away: f64, variance: f64| {
         -0.5 * (away * away / variance + variance.ln() + std::f64::consts::TAU.ln())
     };
@@ -137,15 +137,15 @@ fn decide(ln_star: f64, variance: f64) -> (Decision, f64, f64) {
     // As near to the middle of the two as to the nearer one: that is neither's.
     let between = (ln_star - 0.5 * (span[0] + span[1])).abs() < 0.25 * (span[1] - span[0]);
     let decision = if variance.sqrt() > RESOLVED_SD && nats.abs() < DECIDED_NATS {
-        Decision::TooLittle
+        ReadingDecision::TooLittle
     } else if neither_nats >= DECIDED_NATS && !(span[0]..=span[1]).contains(&ln_star) {
-        Decision::Neither
+        ReadingDecision::Neither
     } else if between || nats.abs() < DECIDED_NATS || neither_nats >= DECIDED_NATS {
-        Decision::Between
+        ReadingDecision::Between
     } else if nats > 0.0 {
-        Decision::PeakToPeak
+        ReadingDecision::PeakToPeak
     } else {
-        Decision::SineAmplitude
+        ReadingDecision::SineAmplitude
     };
     (decision, nats, neither_nats)
 }

@@ -43,7 +43,7 @@ pub mod study;
 pub use body::{Body, Energy, Strain, Work};
 pub use case::RidgeCase;
 pub use contact::{ContactForce, FrictionRule, Plate};
-pub use cycle::{Cycle, Steady};
+pub use cycle::{RidgeCycle, Steady};
 pub use kernel::Surface;
 pub use lanes::Instructions;
 pub use loading::{RidgeRun, RunSettings, run, run_watched};

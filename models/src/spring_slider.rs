@@ -81,7 +81,7 @@ fn contact_area(alpha: f64) -> f64 {
 
 /// The periodic steady state of the slider at one condition.
 #[derive(Clone, Copy, Debug, PartialEq)]
-pub struct Cycle {
+pub struct SlipCycle {
     /// Relative friction `mu'` (Eq. 5), in [0, 1].
     pub mu_relative: f64,
     /// Mean lateral force of the cycle in N, `mu' mu_0 F_n`.
@@ -162,14 +162,14 @@ impl Groups {
 ///
 /// # Errors
 /// A condition or finger outside the domain of the model, by name.
-pub fn solve(c: &Condition, finger: &Finger) -> Result<Cycle, OutOfDomain> {
+pub fn solve(c: &Condition, finger: &Finger) -> Result<SlipCycle, OutOfDomain> {
     c.check()?;
     finger.check()?;
     Ok(solve_checked(c, finger))
 }
 
 /// [`solve`] for values that were checked before: no branch for bad input.
-pub(crate) fn solve_checked(c: &Condition, finger: &Finger) -> Cycle {
+pub(crate) fn solve_checked(c: &Condition, finger: &Finger) -> SlipCycle {
     if c.amplitude.metres() == 0.0 {
         return still(c);
     }
@@ -186,7 +186,7 @@ pub(crate) fn solve_checked(c: &Condition, finger: &Finger) -> Cycle {
     };
     let sticks = regime == Regime::Intermittent;
     let slip_onset = steady.slip_onset.filter(|_| sticks);
-    Cycle {
+    SlipCycle {
         mu_relative,
         lateral_force_n: mu_relative * c.mu0 * c.normal_force_n,
         mean_reaction_force_n: c.normal_force_n,
@@ -199,7 +199,7 @@ pub(crate) fn solve_checked(c: &Condition, finger: &Finger) -> Cycle {
     }
 }
 
-impl Cycle {
+impl SlipCycle {
     /// Standard deviation of `mu'` from independent relative standard deviations `sd` of both stiffnesses:
     /// half the spread at one standard deviation either way, exact to second order.
     pub fn mu_relative_sd(&self, sd: f64) -> f64 {
@@ -231,8 +231,8 @@ impl Cycle {
 }
 
 /// Without vibration: Coulomb friction.
-fn still(c: &Condition) -> Cycle {
-    Cycle {
+fn still(c: &Condition) -> SlipCycle {
+    SlipCycle {
         mu_relative: 1.0,
         lateral_force_n: c.mu0 * c.normal_force_n,
         mean_reaction_force_n: c.normal_force_n,

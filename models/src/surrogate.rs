@@ -10,7 +10,7 @@ mod grid;
 mod spline;
 
 pub use file::{TableError, TableResult};
-pub use grid::{Axis, Grid, GridPoint};
+pub use grid::{GridAxis, GridPoint, SurrogateGrid};
 
 use crate::condition::{Condition, OutOfDomain};
 use crate::finger::Finger;
@@ -53,7 +53,7 @@ pub struct SurrogatePoint {
 #[derive(Clone, Debug)]
 pub struct Surrogate {
     /// The axes of the table.
-    pub grid: Grid,
+    pub grid: SurrogateGrid,
     /// Refined once with monotone cubics along every axis, then read linearly.
     mu: spline::Dense,
     phase: spline::Dense,

@@ -2,16 +2,16 @@
 
 use muprime_models::prediction::{FrictionModel, Validity};
 use muprime_models::ridge::run;
-use muprime_models::surrogate::{Grid, Surrogate, TableError};
+use muprime_models::surrogate::{Surrogate, SurrogateGrid, TableError};
 use muprime_models::{Condition, PeakToPeak};
 
 #[test]
 fn the_shipped_table_belongs_to_this_model() {
     let surrogate = Surrogate::shipped().expect("reads");
-    assert_eq!(surrogate.grid, Grid::SHIPPED);
+    assert_eq!(surrogate.grid, SurrogateGrid::SHIPPED);
     assert_eq!(
         surrogate.inputs_hash,
-        Grid::SHIPPED.inputs_hash(),
+        SurrogateGrid::SHIPPED.inputs_hash(),
         "recompute it: muprime model table --surrogate"
     );
     println!("{:?}", surrogate.error);
@@ -21,9 +21,9 @@ fn the_shipped_table_belongs_to_this_model() {
 #[test]
 fn a_few_held_out_cases_agree_with_the_model_itself() {
     let surrogate = Surrogate::shipped().expect("reads");
-    for point in Grid::SHIPPED.held_out(24).into_iter().filter(|p| !p.at_rest) {
+    for point in SurrogateGrid::SHIPPED.held_out(24).into_iter().filter(|p| !p.at_rest) {
         let c = point.case;
-        let fe = run(&c, &Grid::settings()).expect("runs").mu_relative;
+        let fe = run(&c, &SurrogateGrid::settings()).expect("runs").mu_relative;
         let s = surrogate.at(
             c.amplitude,
             c.frequency_hz,

@@ -3,8 +3,7 @@
 use crate::MuprimeError;
 use models::prediction::{EmpiricalPsi, FrictionModel, Validity};
 use models::psi::{self, PsiEq17};
-use models::psi_fit;
-use models::{BuiltIn, Condition, Finger, PeakToPeak, Reading};
+use models::{BuiltIn, Condition, Finger, PeakToPeak, Reading, psi_fit};
 use pyo3::buffer::PyBuffer;
 use pyo3::prelude::*;
 use rayon::prelude::*;

@@ -1,7 +1,7 @@
 //! A user's own law as a table.
 
 use crate::{MuprimeError, refused};
-use models::law_table::grid::Grid;
+use models::law_table::grid::LawGrid;
 use pyo3::prelude::*;
 use std::path::Path;
 use tables::law::{file_of, grid_over};
@@ -10,9 +10,9 @@ use tables::passes::parse_passes;
 /// Nodes of a grid by variable.
 type Nodes = Vec<(String, Vec<f64>)>;
 
-fn grid_of(nodes: &Nodes) -> PyResult<Grid> {
+fn grid_of(nodes: &Nodes) -> PyResult<LawGrid> {
     let nodes: Vec<_> = nodes.iter().map(|(name, nodes)| (name.as_str(), nodes.clone())).collect();
-    Grid::of(&nodes).map_err(MuprimeError::new_err)
+    LawGrid::of(&nodes).map_err(MuprimeError::new_err)
 }
 
 /// A grid over the passes of a point table (`name` is how messages call it) for these variables.

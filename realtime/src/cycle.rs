@@ -8,7 +8,7 @@
 use crate::estimate::{EstimateConfig, Mu0, MuRelative, NoMu, Window};
 use crate::ports::Nanos;
 use crate::render::{Render, Rendered};
-use crate::safety::{Controls, Decision, Exposed, Limits, Observation, Request, Safety};
+use crate::safety::{Controls, Exposed, Limits, Observation, Request, Safety, SafetyDecision};
 use models::{Ambient, Condition, Direction, FrictionModel, PeakToPeak};
 use serde::{Deserialize, Serialize};
 
@@ -128,7 +128,7 @@ pub struct Online {
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Outputs {
     /// What safety decided.
-    pub decision: Decision,
+    pub decision: SafetyDecision,
     /// Whether the rig is armed after this cycle.
     pub armed: bool,
     /// Whether the second switch-off channel is being proved.
@@ -166,7 +166,7 @@ pub fn step(
 }
 
 /// The first half of a cycle: commands and safety. What it decides is ready to leave.
-pub fn decide(config: &Config, state: &mut CycleState, inputs: &Inputs, now: Nanos) -> Decision {
+pub fn decide(config: &Config, state: &mut CycleState, inputs: &Inputs, now: Nanos) -> SafetyDecision {
     if !state.begun {
         // What earlier runs did is carried over. A key that was not heard yet may be held all the same: it is
         // released when it has not been heard for its age.
@@ -183,7 +183,7 @@ pub fn judge(
     model: &dyn FrictionModel,
     state: &mut CycleState,
     inputs: &Inputs,
-    decision: &Decision,
+    decision: &SafetyDecision,
     now: Nanos,
 ) -> Outputs {
     let seen = &inputs.seen;

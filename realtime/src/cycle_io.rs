@@ -1,11 +1,15 @@
 //! One cycle of the loop over ports, and the row that it leaves for the record.
+//!
+//! [`run_cycle`] reads the [`Ports`], takes the decision of [`cycle::decide`] to them, and only then lets
+//! [`cycle::judge`] compare with the model. The loop's thread, virtual time and fault bench call it alike.
+//! [`Row`] is plain data: what came in and what was decided, enough to run the cycle again.
 #![deny(clippy::disallowed_types, clippy::disallowed_methods)]
 
 use crate::cycle::{self, COMMANDS_PER_CYCLE, Config, CycleState, Inputs, Marker, Online, Outputs};
 use crate::estimate::{MuRelative, NoMu};
 use crate::ports::{Absent, Amplifier, ForceSensor, Nanos, SafetyInputs, Stage, SupplyCommand, SupplySwitch};
 use crate::render::Rendered;
-use crate::safety::{Cause, Observation, Remark, Trip};
+use crate::safety::{Observation, Remark, Trip, TripCause};
 use models::FrictionModel;
 use serde::{Deserialize, Serialize};
 
@@ -60,10 +64,10 @@ pub struct Row {
     /// A trip latched in this cycle.
     pub tripped: Option<Trip>,
     /// The first rule that is broken now, latched or not.
-    pub blocking: Option<Cause>,
+    pub blocking: Option<TripCause>,
     /// What stands in the way of arming: for whoever asks for a reset. It follows from the inputs, and is not recorded.
     #[serde(skip)]
-    pub waits_for: Option<Cause>,
+    pub waits_for: Option<TripCause>,
     /// Running `mu'`, or why there is none.
     pub mu_relative: Result<MuRelative, NoMu>,
     /// Comparison with the model.

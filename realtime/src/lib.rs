@@ -13,7 +13,7 @@
 //! | [`clock`] | time of drivers, loop and virtual world; a virtual rig's can be held |
 //! | [`queue`] | commands to the loop; a stop waits behind nothing |
 //! | [`fault`] | ports around ports that the loop cannot tell from bare ones: faults |
-//! | [`stall_monitor`] | records when ordinary threads of the machine could not run |
+//! | [`stall_monitor`], [`threads`] | when ordinary threads of the machine could not run; starting threads |
 //! | [`replay`] | recorded cycles through the same code again |
 //! | [`recorder`], `number` | rows, passes, events as MCAP, infinite numbers too; tolerant reading, recovery |
 //!
@@ -47,9 +47,10 @@ pub mod replay;
 pub mod safety;
 mod signals;
 pub mod stall_monitor;
+pub mod threads;
 
 pub use clock::Clock;
 pub use cycle::{Command, Phase};
 pub use cycle_io::{Ports, Row};
 pub use ports::Nanos;
-pub use safety::{Cause, Limits};
+pub use safety::{Limits, TripCause};

@@ -31,11 +31,11 @@ use models::PeakToPeak;
 use serde::{Deserialize, Serialize};
 
 pub use arming::Proof;
-pub use cause::{Cause, Unit};
+pub use cause::{TripCause, Unit};
 pub use exposure::{Exposed, MINUTE_NS, MINUTES, PART_MINUTES, PARTS};
 pub use limits::{ChannelTiming, HARD, HardLimits, LimitError, Limits, Timing};
 pub use rules::{RULES, Rule};
-use watch::Watch;
+use watch::SafetyMemory;
 
 /// An absolute set-point for the amplifier. Only this module can make one.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize)]
@@ -128,7 +128,7 @@ impl StageCommand {
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
 pub struct Trip {
     /// The rule.
-    pub cause: Cause,
+    pub cause: TripCause,
     /// The value that broke it; infinite where there was no data at all.
     #[serde(with = "crate::number")]
     pub value: f64,
@@ -228,7 +228,7 @@ impl Observation {
 
 /// What safety decided in a cycle.
 #[derive(Clone, Copy, Debug, PartialEq)]
-pub struct Decision {
+pub struct SafetyDecision {
     /// For the amplifier.
     pub drive: DriveCommand,
     /// For the stage.
@@ -240,10 +240,10 @@ pub struct Decision {
     /// Whether the rig was armed in this cycle.
     pub armed_now: bool,
     /// The first rule that is broken now, latched or not.
-    pub blocking: Option<Cause>,
+    pub blocking: Option<TripCause>,
     /// What stands in the way of arming: as `blocking`, save what follows from a supply that was cut on purpose (its amplifier may
     /// show a fault, or nothing), and what only a person may put right before a program asks for a reset, or what would trip at once.
-    pub waits_for: Option<Cause>,
+    pub waits_for: Option<TripCause>,
     /// Lateral force fit for use: valid, fresh, no spike.
     pub lateral_usable: bool,
     /// Normal force fit for use.
@@ -279,7 +279,7 @@ impl Remark {
 #[derive(Clone, Copy, Debug)]
 pub struct Safety {
     state: State,
-    watch: Watch,
+    watch: SafetyMemory,
     cycle: u64,
     sequence: u32,
     reset_before: bool,
@@ -292,11 +292,11 @@ pub struct Safety {
 impl Default for Safety {
     /// Starts faulted: nothing drives before an explicit reset.
     fn default() -> Self {
-        let start =
-            Trip { cause: Cause::StartUp, value: 0.0, bound: 0.0, unit: Unit::Flag, cycle: 0, at: Nanos(0) };
+        let (cause, unit) = (TripCause::StartUp, Unit::Flag);
+        let start = Trip { cause, value: 0.0, bound: 0.0, unit, cycle: 0, at: Nanos(0) };
         Safety {
             state: State::Faulted(start),
-            watch: Watch::new(),
+            watch: SafetyMemory::new(),
             cycle: 0,
             sequence: 0,
             reset_before: false,
@@ -335,7 +335,7 @@ impl Safety {
         request: &Request,
         controls: Controls,
         now: Nanos,
-    ) -> Decision {
+    ) -> SafetyDecision {
         self.cycle += 1;
         self.sequence = self.sequence.wrapping_add(1);
         let reset_edge = controls.reset && !self.reset_before;
@@ -359,7 +359,7 @@ impl Safety {
             now,
         };
         let broken = rules::first_broken_but(&context, &[]);
-        let mut decision = Decision {
+        let mut decision = SafetyDecision {
             drive: DriveCommand::off(self.sequence, now),
             stage: StageCommand::stop(self.sequence, now),
             supply: SupplyCommand::Cut,

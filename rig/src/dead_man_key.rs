@@ -8,7 +8,7 @@
 //! nothing; it is given back whatever ends the run, but for a SIGKILL (`stty sane` does it then).
 
 use crate::terminal::{self, CtrlC};
-use realtime::Command;
+use realtime::{Command, threads};
 use std::io;
 use std::sync::Arc;
 use std::sync::atomic::{AtomicBool, Ordering};
@@ -51,7 +51,7 @@ impl DeadManKey {
                 }
             }
         };
-        self.reader = Some(std::thread::Builder::new().name("dead-man key".into()).spawn(read)?);
+        self.reader = Some(threads::spawn("dead-man key", read)?);
         Ok(self)
     }
 }

@@ -15,7 +15,7 @@ use drivers::{HealthReport, InstrumentSetup, InstrumentsSetup, OpenError};
 use ports::Opened;
 use realtime::cycle::{COMMANDS_PER_CYCLE, Config, CycleState, Inputs, decide};
 use realtime::ports::{AmplifierState, Channel, Nanos, NoData, Quality, Sample};
-use realtime::safety::{Cause, ChannelTiming, Observation, Timing};
+use realtime::safety::{ChannelTiming, Observation, Timing, TripCause};
 use realtime::stall_monitor::{StallMonitor, StallReport};
 use runs::Setup;
 use serde::Serialize;
@@ -49,7 +49,7 @@ pub struct LinkCounts {
 }
 
 /// One instrument as it was found.
-pub struct Found {
+pub struct InstrumentFound {
     /// What it is to the rig.
     pub role: Role,
     /// Its profile's id.
@@ -65,11 +65,11 @@ pub struct Found {
 /// Everything that was found.
 pub struct Inspection {
     /// Each instrument, in the order of the setup.
-    pub found: Vec<Found>,
+    pub found: Vec<InstrumentFound>,
     /// What was seen last of all; of what could not be opened [`NoData::NotFitted`].
     pub seen: Observation,
     /// The rule that most often prevented arming, with the share of cycles in which any did; if all opened.
-    pub blocking: Option<(Cause, f64)>,
+    pub blocking: Option<(TripCause, f64)>,
     /// Stalls of this computer during the inspection: what the links lost then is not their fault.
     pub stalls: StallReport,
 }
@@ -143,7 +143,7 @@ struct Rules {
     config: Config,
     state: CycleState,
     cycles: u32,
-    blocked: Vec<(Cause, u32)>,
+    blocked: Vec<(TripCause, u32)>,
 }
 
 impl Rules {
@@ -166,7 +166,7 @@ impl Rules {
         let inputs = Inputs { commands: [None; COMMANDS_PER_CYCLE], seen: judged };
         let blocking = decide(&self.config, &mut self.state, &inputs, now).blocking.filter(|_| counts);
         self.cycles += u32::from(counts);
-        let explained = |cause: &Cause| open && cause.may_be_an_open_supply();
+        let explained = |cause: &TripCause| open && cause.may_be_an_open_supply();
         let Some(cause) = blocking.filter(|cause| !explained(cause)) else { return };
         match self.blocked.iter_mut().find(|(c, _)| *c == cause) {
             Some((_, n)) => *n += 1,
@@ -175,7 +175,7 @@ impl Rules {
     }
 
     /// The rule that most often prevented arming, with the share of cycles in which any did.
-    fn worst(&self) -> Option<(Cause, f64)> {
+    fn worst(&self) -> Option<(TripCause, f64)> {
         let all: u32 = self.blocked.iter().map(|(_, n)| n).sum();
         let (cause, _) = self.blocked.iter().max_by_key(|(_, n)| *n)?;
         Some((*cause, f64::from(all) / f64::from(self.cycles.max(1))))
@@ -211,7 +211,7 @@ pub fn inspect(setup: &Setup, instruments: &InstrumentsSetup) -> Inspection {
     let seconds = began.elapsed().as_secs_f64();
     let whole = all.iter().all(|o| o.link.is_ok());
     let last = last.unwrap_or_else(|| ports.read(Nanos(0)));
-    let found = all.into_iter().zip(before.iter().zip(&after)).map(|(o, (before, after))| Found {
+    let found = all.into_iter().zip(before.iter().zip(&after)).map(|(o, (before, after))| InstrumentFound {
         role: o.role,
         id: o.instrument.profile.clone(),
         address: o.instrument.address.clone(),

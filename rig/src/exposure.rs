@@ -14,9 +14,9 @@
 #![allow(clippy::disallowed_methods, reason = "a ledger is written beside the loop, while the run goes")]
 
 use miette::WrapErr;
-use realtime::Nanos;
 use realtime::pacing::Lifeline;
 use realtime::safety::{Exposed, Limits, MINUTE_NS, MINUTES, PART_MINUTES, PARTS};
+use realtime::{Nanos, threads};
 use runs::Setup;
 use runs::exposure_left::{Left, in_the_last_hour};
 use runs::job::Notes;
@@ -44,7 +44,7 @@ const PLACE: usize = 8192;
 /// What a place holds.
 #[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
-struct Entry {
+struct Account {
     /// Counts entries: the newest that can be read is the ledger.
     number: u64,
     /// What or whom it is of: one identity of the amplifier, or the person.
@@ -60,7 +60,7 @@ struct Entry {
     minutes: BTreeMap<i64, (u64, f64)>,
 }
 
-impl Entry {
+impl Account {
     /// Adds what was driven since the last time, all of it in the newest minute, or what was rested.
     fn add(&mut self, driven_ns: u64, dose_m2_s: f64, rest: Nanos, now_ns: u64) {
         if driven_ns > 0 {
@@ -119,9 +119,9 @@ fn machine_time() -> io::Result<(String, u64)> {
 struct Book {
     file: File,
     path: PathBuf,
-    entry: Entry,
+    entry: Account,
     /// What other users' files hold of the same, with their locks.
-    others: Vec<(File, Entry)>,
+    others: Vec<(File, Account)>,
 }
 
 /// The ledger of a run: a book for each identity of its amplifier, and one for its person.
@@ -248,7 +248,7 @@ impl Ledger {
                 }
             }
         };
-        let thread = std::thread::Builder::new().name("exposure".into()).spawn(keep)?;
+        let thread = threads::spawn("exposure", keep)?;
         Ok(Keeping { state, end, thread: Some(thread) })
     }
 }
@@ -287,7 +287,7 @@ impl Book {
             miette::miette!(help = "see what it is, and remove it", "{}: {e}", path.display())
         })?;
         let none =
-            || Entry { amplifier: of.into(), boot: boot.clone(), until_ns: now_ns, ..Entry::default() };
+            || Account { amplifier: of.into(), boot: boot.clone(), until_ns: now_ns, ..Account::default() };
         let found = |file: &File, path: &Path| {
             file.try_lock().map_err(|e| match e {
                 TryLockError::WouldBlock => miette::miette!(
@@ -344,7 +344,7 @@ impl Book {
         Ok(())
     }
 
-    fn write(&mut self, mut entry: Entry) -> io::Result<()> {
+    fn write(&mut self, mut entry: Account) -> io::Result<()> {
         // Somebody who removed the file would make the next run start from nothing.
         if std::fs::symlink_metadata(&self.path).map(|m| inode(&m))? != inode(&self.file.metadata()?) {
             return Err(io::Error::other("the file was replaced"));
@@ -364,7 +364,7 @@ impl Book {
 }
 
 /// The newest entry of a file that is of this identity; none where nothing was ever written.
-fn newest(file: &File, of: &str) -> miette::Result<Option<Entry>> {
+fn newest(file: &File, of: &str) -> miette::Result<Option<Account>> {
     let length = file.metadata().map_err(|e| miette::miette!("{e}"))?.len();
     let places = [0, 1].map(|place| read_place(file, place).filter(|e| e.amplifier == of));
     let newest = places.into_iter().flatten().max_by_key(|entry| entry.number);
@@ -427,7 +427,7 @@ fn inode(metadata: &std::fs::Metadata) -> (u64, u64) {
 }
 
 /// The entry of a place, if all of it is there.
-fn read_place(file: &File, place: u64) -> Option<Entry> {
+fn read_place(file: &File, place: u64) -> Option<Account> {
     let mut bytes = vec![0; PLACE];
     file.read_exact_at(&mut bytes, place * PLACE as u64).ok()?;
     let text = String::from_utf8(bytes).ok()?;

@@ -4,7 +4,7 @@
 mod guided;
 mod live;
 
-use drivers::vibrometer::Settings;
+use drivers::vibrometer::VibrometerSettings;
 use runs::Setup;
 use tables::calibrate::{Bench, LiveTable, SeriesOptions};
 
@@ -21,7 +21,7 @@ impl Bench for AtTheBench {
     }
 
     /// The settings of the vibrometer's controller, read back now; they must cover the drive's frequency.
-    fn vibrometer(&self, setup: &Setup, frequency_hz: f64) -> miette::Result<Settings> {
+    fn vibrometer(&self, setup: &Setup, frequency_hz: f64) -> miette::Result<VibrometerSettings> {
         let Some(vibrometer) = &setup.file.vibrometer else {
             miette::bail!(
                 help = "[vibrometer] profile = \"polytec-ofv5000\", address = \"/dev/ttyS0\", decoder = \"VD-02\"",

@@ -2,6 +2,7 @@
 //! whatever ends the program, but for a SIGKILL (`reset` does it then).
 #![allow(clippy::disallowed_methods, reason = "writes to a terminal beside everything else")]
 
+use realtime::threads;
 use runs::print;
 use rustix::event::{PollFd, PollFlags, Timespec, poll};
 use rustix::termios::{
@@ -165,7 +166,7 @@ pub fn give_back() {
         }
         let _ = done.send(());
     };
-    if std::thread::Builder::new().name("terminal".into()).spawn(write).is_ok() {
+    if threads::spawn("terminal", write).is_ok() {
         let _ = written.recv_timeout(PATIENCE);
     }
 }

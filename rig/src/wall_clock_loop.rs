@@ -8,13 +8,12 @@
 #![allow(clippy::disallowed_methods, reason = "the supervisor waits in wall-clock time, beside the loop")]
 
 use drivers::Links;
-use miette::IntoDiagnostic;
 use models::FrictionModel;
 use realtime::clock::{Clock, Participant};
 use realtime::cycle::{Command, Config};
 use realtime::pacing::{self, Lifeline, LoopParts, LoopReport, Pacing};
 use realtime::queue::CommandQueue;
-use realtime::{Nanos, Ports, Row};
+use realtime::{Nanos, Ports, Row, threads};
 use ringbuf::traits::{Consumer, Split};
 use ringbuf::{HeapCons, HeapRb};
 use runs::supervisor::{Loop, OffReport};
@@ -80,7 +79,7 @@ impl WallClockLoop {
     ///
     /// # Errors
     /// No thread can be had; the links are closed then.
-    pub fn start(parts: Parts) -> miette::Result<(Self, LoopHandle, HeapCons<Row>)> {
+    pub fn start(parts: Parts) -> std::io::Result<(Self, LoopHandle, HeapCons<Row>)> {
         let (rows, record) = HeapRb::<Row>::new(RING).split();
         let (watch, watched) = HeapRb::<Row>::new(RING).split();
         let Parts { config, model, ports, links, pacing, origin_ns } = parts;
@@ -99,7 +98,7 @@ impl WallClockLoop {
         };
         let parts = LoopParts { config, model, ports, commands, rows, watch, life, origin_ns, held };
         let run = move || pacing::run(parts, pacing);
-        rig.looping = Some(std::thread::Builder::new().name("loop".into()).spawn(run).into_diagnostic()?);
+        rig.looping = Some(threads::spawn("loop", run)?);
         let handle = LoopHandle {
             commands: Arc::clone(&rig.commands),
             life: Arc::clone(&rig.life),

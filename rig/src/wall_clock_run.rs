@@ -11,11 +11,10 @@ use crate::emulators::Emulators;
 use crate::exposure::{Keeping, Ledger};
 use crate::rig_lock::RigLock;
 use crate::wall_clock_loop::{Ended, LoopHandle, Parts, WallClockLoop};
-use miette::{IntoDiagnostic, WrapErr};
 use realtime::pacing::{self, Lifeline};
 use realtime::stall_monitor::{StallMonitor, StallReport};
-use realtime::{Clock, Nanos, Ports};
-use runs::ambient::{AmbientControl, OperatorAnswers, World};
+use realtime::{Clock, Nanos, Ports, threads};
+use runs::ambient::{AmbientControl, OperatorAnswers, SimulatedAir};
 use runs::exposure_left::Left;
 use runs::job::run_writer::{self, RunWriter};
 use runs::job::{Begun, Job, Signals, Snapshot, Snapshots, Summary, Unfinished, Update};
@@ -27,7 +26,7 @@ use std::sync::Arc;
 use std::sync::atomic::{AtomicBool, Ordering};
 use std::sync::mpsc::{Receiver, Sender, channel};
 use std::time::Instant;
-use writer::{Entry, Last, Recording, Written};
+use writer::{Last, RecordedNote, Recording, Written};
 
 /// Runs a job: in wall-clock time over its instruments, or in virtual time where the job says so. In
 /// wall-clock time `update` must wait for nothing: whoever keeps the passes calls it.
@@ -74,7 +73,7 @@ fn over_instruments(
     let preamble = run_writer::preamble(&job, start_unix_ns)?;
 
     let lost = Arc::new(AtomicBool::new(false));
-    let monitor = StallMonitor::start(origin_ns).into_diagnostic().wrap_err(Unfinished::Internal)?;
+    let monitor = StallMonitor::start(origin_ns).map_err(begun_fault)?;
     let ports = job.setup.certificates.applied(Ports::new(rig.force, rig.amplifier, rig.stage));
     let (rig, handle, rows) = WallClockLoop::start(Parts {
         config: job.setup.config,
@@ -84,11 +83,11 @@ fn over_instruments(
         pacing: job.setup.file.pace.pacing(),
         origin_ns,
     })
-    .wrap_err(Unfinished::Internal)?;
+    .map_err(begun_fault)?;
     let keeping = ledger.map(|ledger| ledger.keep(rig.life(), handle.stopper()));
-    let keeping = keeping.transpose().into_diagnostic()?;
-    let held = key.map(|key| key.hold(handle.sender())).transpose().into_diagnostic()?;
-    let recording = Recording::start(file, preamble, rows, &lost, &clock)?;
+    let keeping = keeping.transpose().map_err(begun_fault)?;
+    let held = key.map(|key| key.hold(handle.sender())).transpose().map_err(begun_fault)?;
+    let recording = Recording::start(file, preamble, rows, &lost, &clock).map_err(begun_fault)?;
 
     let (note_in, notes) = channel();
     let mut unsaved = None;
@@ -99,10 +98,11 @@ fn over_instruments(
     let (life, stop, session) = (rig.life(), handle.stopper(), tracing::Span::current());
     let (following_sweep, asks) = (&mut sweep, asks(signals, &lost, keeping.as_ref()));
     let (outcome, panicked) = std::thread::scope(|scope| {
-        let following = scope.spawn(move || {
+        let follow = move || {
             let _session = session.enter();
             follow(note_in, &life, &mut snapshots, asks, ambient_control, following_sweep, handle)
-        });
+        };
+        let following = std::thread::Builder::new().name("sweep".into()).spawn_scoped(scope, follow);
         // The receiver of the updates is foreign code, and may panic where its terminal is gone. Then the rig
         // is stopped before anything else, the measurements are stored, and the panic continues with the rig
         // off.
@@ -112,7 +112,9 @@ fn over_instruments(
             lost.store(true, Ordering::Relaxed);
             save(&mut |_| {});
         }
-        (following.join().map_err(|_| fault("the sweep's thread panicked")), finished.err())
+        let outcome = following.map_err(|why| begun_fault(threads::refused(why)));
+        let panicked = |_| fault("the sweep's thread panicked");
+        (outcome.and_then(|following| following.join().map_err(panicked)), finished.err())
     });
 
     // Whatever ended it: off first.
@@ -124,7 +126,7 @@ fn over_instruments(
         keeping.end(ended.off.read_back);
     }
     let (stalls, held_back) = (monitor.finish(), clock.held_back());
-    let written = recording.end(last_words(&outcome, &stalls, &ended)?);
+    let written = recording.end(last_words(&outcome, &stalls, &ended).map_err(begun_fault)?);
     let Ended { report, links, off } = ended;
     if let Some(panic) = panicked {
         tracing::error!("{}", off.words());
@@ -143,7 +145,11 @@ fn over_instruments(
 }
 
 /// What the record ends with, by name, as JSON.
-fn last_words(outcome: &miette::Result<Outcome>, stalls: &StallReport, of: &Ended) -> miette::Result<Last> {
+fn last_words(
+    outcome: &miette::Result<Outcome>,
+    stalls: &StallReport,
+    of: &Ended,
+) -> serde_json::Result<Last> {
     let last = [
         ("loop", serde_json::to_string(&of.report)),
         ("stalls", serde_json::to_string(stalls)),
@@ -151,7 +157,7 @@ fn last_words(outcome: &miette::Result<Outcome>, stalls: &StallReport, of: &Ende
         ("off", serde_json::to_string(&of.off)),
     ];
     let ended = outcome.iter().map(|outcome| ("outcome", serde_json::to_string(outcome)));
-    ended.chain(last).map(|(name, text)| Ok((name.to_string(), text.into_diagnostic()?))).collect()
+    ended.chain(last).map(|(name, text)| Ok((name.to_string(), text?))).collect()
 }
 
 /// The outcome, `RecordLost` where the last rows did not reach the file; logs why the record was lost.
@@ -176,7 +182,7 @@ fn connect(job: &Job, sweep: &Sweep, answers: OperatorAnswers, clock: &Clock) ->
         let served = crate::emulators::serve(&mut instruments, &plant, false);
         emulators = Some((served.map_err(|problem| miette::miette!("{problem}"))?, plant));
     }
-    let air = emulators.as_ref().map(|(_, plant)| World::Served(plant.clone()));
+    let air = emulators.as_ref().map(|(_, plant)| SimulatedAir::Served(plant.clone()));
     let ambient_control = AmbientControl::open(sweep, instruments.chamber.as_ref(), air, answers)?;
     let rig = drivers::open(&instruments, clock.clone()).map_err(|e| {
         miette::miette!(help = "check address, wiring and power; 'muprime doctor --setup' says more", "{e}")
@@ -246,7 +252,7 @@ fn pass_on(
     notes: &Receiver<Note>,
     writer: &mut RunWriter,
     lost: &AtomicBool,
-    entries: &Sender<Entry>,
+    entries: &Sender<RecordedNote>,
     unsaved: &mut Option<miette::Report>,
     update: &mut dyn FnMut(Update<'_>),
 ) {
@@ -267,6 +273,11 @@ fn pass_on(
             let _ = entries.send((note.at, note.events, note.pass));
         }
     }
+}
+
+/// An error after the loop had begun: no refusal, the rig was touched.
+fn begun_fault(why: impl std::error::Error + Send + Sync + 'static) -> miette::Report {
+    miette::Report::from_err(why).wrap_err(Unfinished::Internal)
 }
 
 /// A fault of this program, after the rig was touched.

@@ -22,6 +22,7 @@ pub use style::Look;
 use crate::live::View;
 use crate::terminal::{self, CtrlC};
 use keys::Hand;
+use miette::IntoDiagnostic;
 use runs::Signals;
 use std::path::{Path, PathBuf};
 use std::sync::atomic::{AtomicBool, Ordering};
@@ -93,13 +94,13 @@ impl Shared {
 }
 
 /// A view that is up until it is dropped.
-pub struct Watch {
+pub struct TerminalView {
     shared: Arc<Shared>,
     threads: Vec<JoinHandle<()>>,
     painted: Receiver<()>,
 }
 
-impl Watch {
+impl TerminalView {
     /// Shows the run in a folder; `lead` are the signals of one that this process leads, whose folder need
     /// not be there yet.
     ///
@@ -119,7 +120,7 @@ impl Watch {
         let shared = Shared { folder: folder.into(), seen, over: AtomicBool::new(false), hand, keys, own };
         let shared = Arc::new(shared);
         let (done, painted) = channel();
-        let mut watch = Watch { shared, threads: Vec::new(), painted };
+        let mut watch = TerminalView { shared, threads: Vec::new(), painted };
         watch.thread("watch: source", source::hear)?;
         if watch.shared.keys == Keys::Here {
             watch.thread("watch: keys", keys::take_keys)?;
@@ -138,8 +139,7 @@ impl Watch {
             let _over = Over(Arc::clone(&shared));
             body(&shared);
         };
-        let thread = std::thread::Builder::new().name(name.into()).spawn(run);
-        self.threads.push(thread.map_err(|why| miette::miette!("no thread for the view: {why}"))?);
+        self.threads.push(realtime::threads::spawn(name, run).into_diagnostic()?);
         Ok(())
     }
 
@@ -163,7 +163,7 @@ impl Drop for Over {
     }
 }
 
-impl Drop for Watch {
+impl Drop for TerminalView {
     fn drop(&mut self) {
         self.shared.over.store(true, Ordering::Relaxed);
         // It ends when the painter has put its end of the channel away; nothing is ever sent.

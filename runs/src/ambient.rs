@@ -6,7 +6,7 @@
 
 mod ambient_control;
 
-pub use ambient_control::{AmbientControl, OperatorAnswers, World};
+pub use ambient_control::{AmbientControl, OperatorAnswers, SimulatedAir};
 
 use crate::input::{Problems, unit_meant, unit_of};
 use crate::plan::{Plan, series_place};
@@ -100,7 +100,7 @@ impl std::fmt::Display for Source {
 
 /// A value that was found.
 #[derive(Clone, Copy, Debug, PartialEq)]
-pub struct Found {
+pub struct AirLevel {
     /// In the unit of its quantity.
     pub value: f64,
     /// When, in loop time.

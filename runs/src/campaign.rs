@@ -197,8 +197,7 @@ impl Campaign {
         }
         crate::files::make_folder(&folder.join("sessions"))?;
         self.store_origin(folder)?;
-        let kinds: Vec<crate::fingertip::FingertipKind> =
-            self.setups.iter().map(|setup| setup.tip.kind).collect();
+        let kinds: Vec<_> = self.setups.iter().map(|setup| setup.tip.kind).collect();
         crate::files::write_plain(&folder.join(KINDS), serde_json::json!(kinds).to_string())?;
         crate::files::write_plain(&stored, &self.text)
     }

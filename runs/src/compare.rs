@@ -114,7 +114,7 @@ pub enum ComparisonAnswer {
     NotIndependent,
 }
 
-impl Comparison {
+impl RunComparison {
     /// The pairs, those furthest apart first.
     pub fn furthest_first(&self) -> Vec<&Paired> {
         let mut pairs: Vec<&Paired> = self.pairs.iter().collect();
@@ -236,7 +236,7 @@ impl Judged {
 
 /// A comparison of two runs.
 #[derive(Clone, Debug, PartialEq, Serialize)]
-pub struct Comparison {
+pub struct RunComparison {
     /// References of the first and the second run.
     pub references: [Reference; 2],
     /// Conditions in common, in the order of the first run.
@@ -333,7 +333,7 @@ fn by_condition<'a>(sides: &[&'a Side]) -> Vec<(&'a Pass, Vec<Vec<&'a Pass>>)> {
 }
 
 /// Pairs the passes of two runs and judges their differences, over the `mu_0` of each.
-pub fn compare(sides: [&Side; 2], references: [Reference; 2]) -> Comparison {
+pub fn compare(sides: [&Side; 2], references: [Reference; 2]) -> RunComparison {
     let [a, b] = sides;
     let set = set_by(&sides);
     let (mut pairs, mut unpaired) = (Vec::new(), [0, 0]);
@@ -360,7 +360,7 @@ pub fn compare(sides: [&Side; 2], references: [Reference; 2]) -> Comparison {
         });
     }
     let judged = judge(&pairs, &references);
-    Comparison { references, pairs, unpaired, judged }
+    RunComparison { references, pairs, unpaired, judged }
 }
 
 fn shared_variance(references: &[Reference; 2]) -> f64 {

@@ -19,7 +19,10 @@ pub fn until_the_end(subcommand: impl FnOnce() -> ExitCode + Send + 'static, fai
     let thread = std::thread::Builder::new().name("subcommand".into()).stack_size(8 << 20).spawn(run);
     match thread {
         Ok(_) => ended.recv().unwrap_or(ExitCode::from(failed)),
-        Err(_) => ExitCode::from(failed),
+        Err(why) => {
+            crate::print::remark(&realtime::threads::refused(why).to_string());
+            ExitCode::from(failed)
+        }
     }
 }
 

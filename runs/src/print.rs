@@ -187,8 +187,7 @@ pub fn beside() -> io::Result<()> {
     }
     outlets().get_or_insert_default();
     for (output, name) in [(OUT, "standard output"), (ERR, "standard error")] {
-        let thread = std::thread::Builder::new().name(name.into()).spawn(move || write_on(output));
-        if let Err(why) = thread {
+        if let Err(why) = realtime::threads::spawn(name, move || write_on(output)) {
             *outlets() = None;
             return Err(why);
         }
@@ -313,9 +312,9 @@ pub fn lacks() -> Option<io::Error> {
 
 /// Standard error for logs: never fails, never passes control characters on.
 #[derive(Clone, Copy, Debug, Default)]
-pub struct Remarks;
+pub struct LogWriter;
 
-impl Write for Remarks {
+impl Write for LogWriter {
     fn write(&mut self, bytes: &[u8]) -> io::Result<usize> {
         question(&String::from_utf8_lossy(bytes));
         Ok(bytes.len())

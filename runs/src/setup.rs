@@ -26,7 +26,7 @@ use serde::{Deserialize, Serialize};
 use std::path::{Path, PathBuf};
 
 pub use limits::LimitsFile;
-pub use profiles::{Axis, library, look_in};
+pub use profiles::{ForceAxisSignal, library, look_in};
 
 /// Name and text of every bundled setup. Add one: a file in `runs/setups/` and a line here.
 pub const BUNDLED: &[(&str, &str)] = &[

@@ -16,7 +16,7 @@ mod events;
 mod passing;
 
 pub use at_rig::Question;
-pub use events::{Event, MeasuredPass, Outcome, Zero, Zeros};
+pub use events::{Event, MeasuredPass, Outcome, ZeroLevels, Zeros};
 
 use crate::certificates::temperature::{TemperatureFlag, TemperatureRange};
 use crate::exposure_left::Left;
@@ -30,7 +30,7 @@ use realtime::Row;
 use realtime::compare::{Agreement, Comparator, PassComparison};
 use realtime::cycle::{Command, Marker, Phase};
 use realtime::ports::{Nanos, NoData};
-use realtime::safety::{Cause, ChannelTiming, Limits, Remark, Request};
+use realtime::safety::{ChannelTiming, Limits, Remark, Request, TripCause};
 use std::sync::Arc;
 
 /// What a row led to.
@@ -264,7 +264,7 @@ impl Sweep {
         if self.state == State::Over {
             return out;
         }
-        let stopped = row.tripped.is_some_and(|trip| trip.cause == Cause::Stopped);
+        let stopped = row.tripped.is_some_and(|trip| trip.cause == TripCause::Stopped);
         if stopped && std::mem::take(&mut self.pausing) {
             return out;
         }
@@ -447,10 +447,10 @@ impl Sweep {
 
     /// The rule that a paused rig breaks: it is not seen off, at rest and lifted off. Weights that load the
     /// finger are not lifted.
-    fn loud(&self, row: &Row) -> Option<Cause> {
+    fn loud(&self, row: &Row) -> Option<TripCause> {
         let normal = row.inputs.seen.forces.normal.as_ref();
         let loaded = self.load_commanded && normal.map_or(true, |reading| reading.value.abs() > LIFTED_N);
-        awake(row).or(loaded.then_some(Cause::LoadImplausible))
+        awake(row).or(loaded.then_some(TripCause::LoadImplausible))
     }
 
     fn approach(&mut self, row: &Row, since: Nanos, out: &mut Reaction) {
@@ -509,13 +509,17 @@ fn sliding(c: &Condition) -> Request {
 }
 
 /// The rule that a rig breaks which is not seen off and at rest.
-fn awake(row: &Row) -> Option<Cause> {
+fn awake(row: &Row) -> Option<TripCause> {
     let seen = &row.inputs.seen;
     let (Ok(amplifier), Ok(stage)) = (&seen.amplifier, &seen.stage) else {
-        return Some(if seen.stage.is_ok() { Cause::AmplifierStale } else { Cause::StageStale });
+        return Some(if seen.stage.is_ok() { TripCause::AmplifierStale } else { TripCause::StageStale });
     };
     let moves = stage.velocity_m_s.abs() > STANDS_M_S;
-    if amplifier.output_on { Some(Cause::RefusesOff) } else { moves.then_some(Cause::StageNotFollowing) }
+    if amplifier.output_on {
+        Some(TripCause::RefusesOff)
+    } else {
+        moves.then_some(TripCause::StageNotFollowing)
+    }
 }
 
 #[cfg(test)]

@@ -5,8 +5,8 @@ pub mod files;
 use crate::format::{quantity, with_interval};
 use diagnosis::report::certificates;
 use diagnosis::report::format::{plain, probability};
-use diagnosis::report::intervals::{Estimate, Shape};
-use diagnosis::report::locate::Region;
+use diagnosis::report::intervals::{Estimate, ProfileShape};
+use diagnosis::report::locate::GapRegion;
 use diagnosis::{Diagnosis, Hypothesis};
 use miette::IntoDiagnostic;
 use models::covariate::{self, Covariate};
@@ -89,7 +89,7 @@ pub(crate) fn name(effects: &[String]) -> String {
 /// A parameter's value with its interval, or as assumed where the table adds nothing to the prior.
 pub fn estimate(p: &Estimate) -> String {
     match p.shape {
-        Shape::Prior => {
+        ProfileShape::Prior => {
             format!("{} (as assumed; this table does not determine it)", quantity(p.value, p.unit))
         }
         _ => with_interval(p.value, p.ci95, p.unit),
@@ -113,8 +113,8 @@ pub fn looks_like(result: &Diagnosis) -> impl Iterator<Item = String> + '_ {
 
 /// Regions with passes in which the gap shows, the largest first and no more than `most`; and a line that
 /// counts the others.
-pub fn listed(regions: &[Region], most: usize) -> (Vec<&str>, Option<String>) {
-    let shows = |g: &&Region| g.measured && g.p_value < SIGNIFICANT && g.share_of_gap >= LEAST_SHARE;
+pub fn listed(regions: &[GapRegion], most: usize) -> (Vec<&str>, Option<String>) {
+    let shows = |g: &&GapRegion| g.measured && g.p_value < SIGNIFICANT && g.share_of_gap >= LEAST_SHARE;
     let shown: Vec<&str> = regions.iter().filter(shows).take(most).map(|g| &*g.text).collect();
     let empty = regions.iter().filter(|g| !g.measured).count();
     let weak = regions.iter().filter(|g| g.measured && g.p_value >= SIGNIFICANT).count();

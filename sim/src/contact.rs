@@ -195,7 +195,7 @@ impl Contact {
             return self.steady_modulated();
         }
         if self.has_inertia() {
-            return resolved::steady(self, resolved::Settings::default()).steady;
+            return resolved::steady(self, resolved::MarchSettings::default()).steady;
         }
         let plain = self.limit == Limit::default()
             && self.recovery == StretchRecovery::Instant

@@ -58,7 +58,7 @@ impl Default for FingerConfig {
 
 /// The one fingertip on this rig: its true properties.
 #[derive(Clone, Copy, Debug, PartialEq)]
-pub struct Finger {
+pub struct VirtualFinger {
     /// True normal stiffness (N/m).
     pub normal_stiffness_n_per_m: f64,
     /// True lateral stiffness (N/m).
@@ -69,7 +69,7 @@ pub struct Finger {
     recovery: StretchRecovery,
 }
 
-impl Finger {
+impl VirtualFinger {
     /// The fingertip of a seed.
     pub fn new(config: &FingerConfig, seed: u64) -> Self {
         let mut noise = Noise::new(seed, "finger");

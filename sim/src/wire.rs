@@ -34,7 +34,7 @@ pub mod world;
 
 pub use quantity::{Command, Quantity};
 
-use realtime::{Clock, Nanos};
+use realtime::{Clock, Nanos, threads};
 use std::io;
 use std::sync::atomic::{AtomicBool, Ordering};
 use std::sync::{Arc, Mutex, MutexGuard};
@@ -56,7 +56,7 @@ impl Service {
                 turn(&stopped);
             }
         };
-        let thread = std::thread::Builder::new().name(name.into()).spawn(work)?;
+        let thread = threads::spawn(name, work)?;
         Ok(Service { stop, thread: Some(thread) })
     }
 

@@ -24,7 +24,7 @@ use crate::contact::averaged::Averager;
 use crate::contact::resolved::March;
 use crate::contact::{Contact, Motion, Steady, StretchRecovery};
 use crate::defects::{Forces, Surroundings};
-use crate::finger::{Finger, Pad};
+use crate::finger::{Pad, VirtualFinger};
 use crate::noise::Noise;
 use crate::plate::Plate;
 use crate::room::{Air, Room};
@@ -77,7 +77,7 @@ pub struct World {
     every: [u64; 3],
     sequence: [u32; 2],
     /// The fingertip's true properties: outside, for scoring only.
-    pub finger: Finger,
+    pub finger: VirtualFinger,
     pad: Pad,
     plate: Plate,
     /// The amplifier, and the relay in its supply: a wire of its own, whatever its link does.
@@ -128,7 +128,7 @@ impl World {
             ticks: 0,
             every,
             sequence: [0; 2],
-            finger: Finger::new(&config.finger, seed),
+            finger: VirtualFinger::new(&config.finger, seed),
             pad: Pad::default(),
             plate: Plate::new(config.plate),
             amplifier: Amplifier::new(config.amplifier, config.room.temperature_c),

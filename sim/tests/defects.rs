@@ -1,7 +1,7 @@
 //! Each defect shows in a table if it says so, grows from nothing, and leaves forces bounded.
 
 use muprime_sim::defects::{ALL, Defect, Defects, Surroundings, Values};
-use muprime_sim::finger::{Finger, FingerConfig};
+use muprime_sim::finger::{FingerConfig, VirtualFinger};
 use muprime_sim::noise::Noise;
 use muprime_sim::world::{Point, steady_forces};
 
@@ -30,8 +30,8 @@ fn points(n: usize) -> Vec<Point> {
         .collect()
 }
 
-fn finger() -> Finger {
-    Finger::new(&FingerConfig { stiffness_relative_sd: 0.0, ..FingerConfig::default() }, 0)
+fn finger() -> VirtualFinger {
+    VirtualFinger::new(&FingerConfig { stiffness_relative_sd: 0.0, ..FingerConfig::default() }, 0)
 }
 
 /// Rms change of the measured friction over mu0 F, against the ideal world.

@@ -3,14 +3,14 @@
 
 use models::PeakToPeak;
 use muprime_sim::defects::{Defect, DefectKind, Defects, Surroundings};
-use muprime_sim::finger::{Finger, FingerConfig};
+use muprime_sim::finger::{FingerConfig, VirtualFinger};
 use muprime_sim::sealed::imitate::Imitator;
 use muprime_sim::sealed::oracle::Case;
 use muprime_sim::sealed::{Ask, Stratum};
 use muprime_sim::world::{Point, steady_forces};
 
-fn finger() -> Finger {
-    Finger::new(&FingerConfig { stiffness_relative_sd: 0.0, ..FingerConfig::default() }, 1)
+fn finger() -> VirtualFinger {
+    VirtualFinger::new(&FingerConfig { stiffness_relative_sd: 0.0, ..FingerConfig::default() }, 1)
 }
 
 /// A full sweep: six amplitudes, four speeds, three forces, both directions.
@@ -40,7 +40,11 @@ fn sweep() -> Vec<Point> {
 }
 
 /// What the oracle says of forces from a world that differs from the nominal one in `changed` and `defects`.
-fn asked(truth: &str, changed: impl Fn(&mut Finger, &mut Point), defects: &Defects) -> (f64, Vec<Imitator>) {
+fn asked(
+    truth: &str,
+    changed: impl Fn(&mut VirtualFinger, &mut Point),
+    defects: &Defects,
+) -> (f64, Vec<Imitator>) {
     asked_beside(&[truth], &[], changed, defects)
 }
 
@@ -48,7 +52,7 @@ fn asked(truth: &str, changed: impl Fn(&mut Finger, &mut Point), defects: &Defec
 fn asked_beside(
     truth: &[&str],
     beside: &[Defect],
-    changed: impl Fn(&mut Finger, &mut Point),
+    changed: impl Fn(&mut VirtualFinger, &mut Point),
     defects: &Defects,
 ) -> (f64, Vec<Imitator>) {
     let known = sweep();
@@ -102,7 +106,7 @@ fn a_gain_of_the_amplitude_is_a_gain_of_the_normal_stiffness() {
 #[test]
 fn a_gain_of_the_speed_is_a_gain_of_the_lateral_stiffness() {
     // The cause `speed_error` has a slip of its own, so it comes near but not to nothing.
-    let soft = |own: &mut Finger, _: &mut Point| own.lateral_stiffness_n_per_m /= 1.5;
+    let soft = |own: &mut VirtualFinger, _: &mut Point| own.lateral_stiffness_n_per_m /= 1.5;
     let (gap, list) = asked("stiffness_error", soft, &Defects::none());
     println!("gap {gap:.0}: {:?}", &list[..3]);
     assert!(gap > 100.0);
@@ -145,7 +149,7 @@ fn ridges_that_fly_are_asked_of_each_other() {
 #[test]
 fn an_alias_stays_one_beside_another_cause() {
     let tilt = one("plate_tilt", [0.05, 0.0, 0.0, 0.0]);
-    let gain = |_: &mut Finger, point: &mut Point| point.known_pp_m *= 1.9;
+    let gain = |_: &mut VirtualFinger, point: &mut Point| point.known_pp_m *= 1.9;
     let (gap, list) = asked_beside(&["amplitude_miscalibration"], &tilt.defects, gain, &tilt);
     assert!(gap > 100.0, "{gap}");
     assert_eq!((list[0].name.as_str(), list[0].instead_of.len()), ("stiffness_error", 1));
@@ -154,7 +158,7 @@ fn an_alias_stays_one_beside_another_cause() {
 
 #[test]
 fn one_gain_stands_for_two_and_for_a_gain_with_a_tilt_does_not() {
-    let two = |own: &mut Finger, point: &mut Point| {
+    let two = |own: &mut VirtualFinger, point: &mut Point| {
         point.known_pp_m *= 1.5;
         own.normal_stiffness_n_per_m *= 1.3;
     };

@@ -12,7 +12,7 @@ pub mod store;
 pub use collapse::collapse;
 use miette::{IntoDiagnostic, miette};
 use models::ridge::study::{Panel, StudyPoint, content_key, fig_9_at};
-use models::ridge::{self, Cycle, RidgeCase, RidgeRun, RunSettings};
+use models::ridge::{self, RidgeCase, RidgeCycle, RidgeRun, RunSettings};
 use plot::{Chart, PaperMark, Series};
 use reading::Reading;
 use runs::report::plots::ends;
@@ -243,7 +243,7 @@ pub fn lateral_force(base: RidgeCase, reading: Reading) -> miette::Result<Reprod
     let case = base.at_w(reading, 1.35e-6);
     let result = run(&case)?;
     let scale = case.finger_per_ridge_m();
-    let Cycle { normal, lateral, .. } = &result.mean_cycle;
+    let RidgeCycle { normal, lateral, .. } = &result.mean_cycle;
     let n = normal.len();
     // From the touch-down after the longest absence to the first bin that slips.
     let sticks = (0..n).filter(|i| normal[*i] > 0.0 && lateral[*i] < 0.99 * case.mu0 * normal[*i]).count();

@@ -2,6 +2,7 @@
 
 use indicatif::{ProgressBar, ProgressDrawTarget, ProgressStyle};
 use miette::IntoDiagnostic;
+use realtime::threads;
 use runs::exit::exit_now;
 use runs::say;
 use std::io::IsTerminal;
@@ -55,7 +56,7 @@ pub fn on_interrupt(bar: &ProgressBar, partial: impl FnOnce(u64) + Send + 'stati
             bar.finish_and_clear();
             say!("stopped by Ctrl-C: what follows is partial");
             // Printing it may take long, or fail: the next Ctrl-C does not wait for it.
-            let thread = std::thread::Builder::new().name("partial".into()).spawn(move || {
+            let thread = threads::spawn("partial", move || {
                 partial(position);
                 exit_now(INTERRUPTED);
             });
@@ -74,7 +75,7 @@ pub fn on_interrupt(bar: &ProgressBar, partial: impl FnOnce(u64) + Send + 'stati
 pub fn on_signals(signals: &[i32], mut caught: impl FnMut() + Send + 'static) -> miette::Result<()> {
     let mut signals = signal_hook::iterator::Signals::new(signals).into_diagnostic()?;
     let each = move || signals.forever().for_each(|_| caught());
-    std::thread::Builder::new().name("signals".into()).spawn(each).into_diagnostic()?;
+    threads::spawn("signals", each).into_diagnostic()?;
     Ok(())
 }
 

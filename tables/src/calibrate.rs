@@ -21,7 +21,7 @@ use calibration::certificate::{
     CalibrationResult, Certificate, CertificateKind, Circumstances, Instrument, Occasion, Parameter, RawData,
     Verified, date,
 };
-use drivers::vibrometer::Settings;
+use drivers::vibrometer::VibrometerSettings;
 use miette::IntoDiagnostic;
 use models::PeakToPeak;
 use runs::Setup;
@@ -46,7 +46,7 @@ pub trait Bench {
     }
 
     /// The settings of the vibrometer's controller, read back now; they cover the drive's frequency.
-    fn vibrometer(&self, _setup: &Setup, _frequency_hz: f64) -> miette::Result<Settings> {
+    fn vibrometer(&self, _setup: &Setup, _frequency_hz: f64) -> miette::Result<VibrometerSettings> {
         Err(refused())
     }
 }
@@ -158,14 +158,14 @@ pub struct Common {
 pub fn certified(what: &What, bench: &dyn Bench) -> miette::Result<Issued> {
     let (sources, mut more) = (&mut Sources::default(), More::new());
     let (common, outcome) = match what {
-        What::Force(args) => (&args.common, force::outcome_of(args, bench, sources)?),
-        What::Amplitude(of) => (&of.common, amplitude::outcome_of(of, bench, sources)?),
-        What::Latency(of) => (&of.common, latency::outcome_of(&of.args, sources)?),
-        What::Phase(of) => (&of.common, phase::outcome_of(&of.args, bench, sources)?),
-        What::Finger(of) => (&of.common, finger::outcome_of(&of.args, sources, &mut more)?),
-        What::Creep(of) => (&of.common, creep::outcome_of(&of.args, sources)?),
-        What::Gravity(of) => (&of.common, gravity::outcome_of(&of.args, sources)?),
-        What::Noise(of) => (&of.common, noise::outcome_of(&of.args, sources)?),
+        What::Force(args) => (&args.common, force::calibrate(args, bench, sources)?),
+        What::Amplitude(of) => (&of.common, amplitude::calibrate(of, bench, sources)?),
+        What::Latency(of) => (&of.common, latency::calibrate(&of.args, sources)?),
+        What::Phase(of) => (&of.common, phase::calibrate(&of.args, bench, sources)?),
+        What::Finger(of) => (&of.common, finger::calibrate(&of.args, sources, &mut more)?),
+        What::Creep(of) => (&of.common, creep::calibrate(&of.args, sources)?),
+        What::Gravity(of) => (&of.common, gravity::calibrate(&of.args, sources)?),
+        What::Noise(of) => (&of.common, noise::calibrate(&of.args, sources)?),
         What::Step(of) => (&of.common, dynamics::step(&of.args, sources)?),
         What::Tap(of) => (&of.common, dynamics::tap(&of.args, sources)?),
     };

@@ -18,7 +18,7 @@ use serde::de::DeserializeOwned;
 use std::path::Path;
 use std::sync::Arc;
 
-pub use place::{Problem, problems_of, with_place_and_help};
+pub use place::{InputProblem, problems_of, with_place_and_help};
 pub use preflight::preflight;
 
 use place::remedy;

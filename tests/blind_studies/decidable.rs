@@ -77,7 +77,7 @@ pub fn oracle(
     Arc::make_mut(&mut options.constants).set("misfit_sd", "-1000").ok()?;
     let mut fitted = fit_all(&table, rig, &options);
     stated(&mut fitted, rig);
-    let nothing = minimise(&fitted.problem, &[], &fitted.none.u, &fitted.problem.variance, ROUNDS);
+    let nothing = minimise(&fitted.problem, &[], &fitted.baseline.u, &fitted.problem.variance, ROUNDS);
     let gap = fitted.problem.misfit(&nothing.prediction);
     let mut all: BTreeMap<Vec<String>, (f64, f64, f64)> = BTreeMap::new();
     for candidate in &fitted.candidates {

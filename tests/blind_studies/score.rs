@@ -111,7 +111,7 @@ fn with(result: &mut Diagnosis, constants: &Constants) -> Changed {
         |i: usize| -> Vec<String> { fitted.candidates[i].names().iter().map(|n| (*n).to_string()).collect() };
     let mut stated: Vec<(Vec<String>, f64)> =
         (0..fitted.candidates.len()).map(|i| (names(i), decision.probabilities[i])).collect();
-    stated.extend([(Vec::new(), decision.none), (vec!["unknown".to_string()], decision.unknown)]);
+    stated.extend([(Vec::new(), decision.no_gap), (vec!["unknown".to_string()], decision.open_set)]);
     stated.sort_by(|a, b| b.1.total_cmp(&a.1));
     stated.truncate(12);
     let class = decision.class.iter().map(|&i| names(i).join("+")).collect();
@@ -153,7 +153,7 @@ fn score(folder: &Path, options: &Options, changes: &[Constants]) -> Result<Line
         .map(|(h, f)| (h.in_hidden_region, [f.recalibrated, f.corrected].map(|m| error(m, h))))
         .collect();
     let first = report.hypotheses.iter().find(|h| !h.effects.is_empty() && h.effects != ["unknown"]);
-    let none = fitted.none.log_evidence;
+    let none = fitted.baseline.log_evidence;
     let mut evidence: Vec<(String, f64)> =
         fitted.candidates.iter().map(|c| (c.names().join("+"), c.log_evidence - none)).collect();
     evidence.push(("unknown".to_string(), fitted.discrepancy.log_evidence - none));
@@ -212,7 +212,7 @@ fn score(folder: &Path, options: &Options, changes: &[Constants]) -> Result<Line
         }),
         seconds,
         passes: fitted.problem.len(),
-        gap_chi2: fitted.problem.misfit(&fitted.none.prediction),
+        gap_chi2: fitted.problem.misfit(&fitted.baseline.prediction),
         shapes: diagnosis::hypotheses::structure::shapes::nats(&fitted.shapes),
         fits: fitted
             .candidates

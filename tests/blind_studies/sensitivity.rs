@@ -4,7 +4,7 @@
 //! each. What is reported beside the verdict does not enter the score and is left out.
 
 use diagnosis::Verdict;
-use diagnosis::constants::{Constants, Stage};
+use diagnosis::constants::{Constants, EntersAt};
 use diagnosis::data::{RigFile, Table};
 use diagnosis::hypotheses::{Fitted, Options, fit_all};
 use diagnosis::verdict::decide;
@@ -38,9 +38,9 @@ fn answer(set: &Set, fitted: &mut Fitted) -> Answer {
     let leader = decision.leader().map(names).unwrap_or_default();
     let true_place = (0..fitted.candidates.len()).find(|&i| names(i) == truth);
     let (right, probability) = if truth.is_empty() {
-        (decision.verdict == Verdict::NoGap, decision.none)
+        (decision.verdict == Verdict::NoGap, decision.no_gap)
     } else if outside {
-        (decision.verdict == Verdict::Unknown, decision.unknown)
+        (decision.verdict == Verdict::Unknown, decision.open_set)
     } else {
         let named = decision.verdict == Verdict::Named && leader == truth;
         (named, true_place.map_or(0.0, |i| decision.probabilities[i]))
@@ -55,13 +55,13 @@ fn fitted(set: &Set, constants: Constants) -> Fitted {
 }
 
 /// The answers of one set under every change, in the order of the changes, the unchanged constants first.
-fn tried(set: &Set, base: &Constants, changes: &[(Stage, Constants)]) -> Vec<Answer> {
+fn tried(set: &Set, base: &Constants, changes: &[(EntersAt, Constants)]) -> Vec<Answer> {
     let mut own = fitted(set, base.clone());
     // A decision settles the leader's law: each begins with what was fitted.
     let as_fitted = own.candidates.clone();
     let mut list = vec![answer(set, &mut own)];
     for (stage, constants) in changes {
-        list.push(if *stage == Stage::Decision {
+        list.push(if *stage == EntersAt::Decision {
             own.problem.constants = Arc::new(constants.clone());
             own.candidates.clone_from(&as_fitted);
             answer(set, &mut own)
@@ -78,9 +78,9 @@ pub fn run(seed: u64, count: usize, choice: &str) {
     let mut labels = vec![("as it is", 1.0)];
     let mut changes = Vec::new();
     for row in base.rows().iter().filter(|row| match choice {
-        "all" => row.stage != Stage::Report,
-        "fit" => row.stage == Stage::Fit,
-        "decision" => row.stage == Stage::Decision,
+        "all" => row.stage != EntersAt::Report,
+        "fit" => row.stage == EntersAt::Fit,
+        "decision" => row.stage == EntersAt::Decision,
         name => row.name == name,
     }) {
         for factor in FACTORS {

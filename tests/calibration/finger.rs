@@ -8,13 +8,13 @@ use calibration::uncertainty::student::coverage_factor;
 use models::PeakToPeak;
 use models::ridge::{RidgeCase, RunSettings, run};
 use sim::defects::{Defects, Surroundings};
-use sim::finger::{Finger, FingerConfig};
+use sim::finger::{FingerConfig, VirtualFinger};
 use sim::noise::Noise;
 use sim::world::{Point, steady_forces};
 use tests::{documents, muprime, rounds, texts};
 
 /// Passes over loads and speeds with pass-to-pass scatter and force noise, as the rig would measure them.
-fn passes(finger: &Finger, defects: &Defects, draw: &mut Noise) -> Vec<FrictionPoint> {
+fn passes(finger: &VirtualFinger, defects: &Defects, draw: &mut Noise) -> Vec<FrictionPoint> {
     let mut points = Vec::new();
     for normal_force_n in [0.1, 0.2, 0.4, 0.8] {
         for speed_m_s in [0.01, 0.03, 0.1] {
@@ -49,7 +49,7 @@ fn friction_and_its_exponents_are_covered_as_stated() {
     for trial in 0..trials() {
         let mut draw = Noise::new(seed(trial), "friction bench");
         let config = FingerConfig { mu0: draw.between(0.2, 1.2), ..FingerConfig::default() };
-        let finger = Finger::new(&config, seed(trial));
+        let finger = VirtualFinger::new(&config, seed(trial));
         let points = passes(&finger, &Defects::none(), &mut draw);
         let found = friction(&points).unwrap();
         let line = |b: &[f64]| {
@@ -84,7 +84,7 @@ fn friction_and_its_exponents_are_covered_as_stated() {
 fn a_contact_that_is_not_coulombic_is_seen() {
     let text = "[[defect]]\nname = \"load_dependent_friction\"\nparameters = { area_share = 0.9 }\n";
     let mut draw = Noise::new(seed(0), "friction bench");
-    let finger = Finger::new(&FingerConfig::default(), 1);
+    let finger = VirtualFinger::new(&FingerConfig::default(), 1);
     let found = friction(&passes(&finger, &Defects::parse(text).unwrap(), &mut draw)).unwrap();
     let (exponent, u) = (found.fit.estimates[1], found.fit.standard_uncertainty(1));
     // Between Coulomb (0) and a Hertz contact's area (-1/3).

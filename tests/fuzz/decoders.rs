@@ -8,7 +8,7 @@ use instruments::codec::canopen::{self, DriveState, SdoAnswer};
 use instruments::codec::checksum::Check;
 use instruments::codec::eds;
 use instruments::codec::modbus_rtu::{self as rtu, Parsed};
-use instruments::codec::stream::{Cutter, Shape};
+use instruments::codec::stream::{Cutter, FrameShape};
 use instruments::codec::{dbc, text};
 
 /// All of them, by name, in the order that the coverage-guided target counts them.
@@ -59,7 +59,7 @@ pub fn slcan(input: &[u8], chance: &mut Chance) {
 /// Every frame cut from a stream has the right length, sync and check, and split reads change nothing.
 pub fn streams(input: &[u8], chance: &mut Chance) {
     let shapes = [
-        Shape {
+        FrameShape {
             sync: vec![0x20, 0x4E],
             length: 16,
             check: Check::CRC_16_MODBUS,
@@ -67,7 +67,7 @@ pub fn streams(input: &[u8], chance: &mut Chance) {
             check_high_first: None,
             believed_after: 1,
         },
-        Shape {
+        FrameShape {
             sync: Vec::new(),
             length: 13,
             check: Check::Sum7WithErrorBit,

@@ -14,7 +14,7 @@ use rayon::prelude::*;
 use runs::plan::{Plan, Resolution};
 use runs::{Outcome, Setup};
 use sim::defects::{Defects, Surroundings};
-use sim::finger::Finger;
+use sim::finger::VirtualFinger;
 use sim::noise::Noise;
 use sim::world::{Point, WorldConfig, steady_forces};
 use std::sync::Arc;
@@ -35,7 +35,7 @@ type Passes = Vec<(Condition, f64)>;
 struct Nature {
     name: &'static str,
     world: WorldConfig,
-    finger: Finger,
+    finger: VirtualFinger,
     ridge: Option<Surrogate>,
 }
 
@@ -46,7 +46,7 @@ impl Nature {
         let mut built = world.clone();
         world.defects.setup(&mut built);
         let ridge = (world.finger.ridge_table_strokes > 0.0).then(|| Surrogate::shipped().unwrap());
-        Nature { name, finger: Finger::new(&built.finger, 0), world, ridge }
+        Nature { name, finger: VirtualFinger::new(&built.finger, 0), world, ridge }
     }
 
     fn all() -> [Nature; 4] {

@@ -5,7 +5,7 @@
 use models::PeakToPeak;
 use realtime::Ports;
 use realtime::cycle::{Command, Marker};
-use realtime::safety::{Cause, Request, Trip};
+use realtime::safety::{Request, Trip, TripCause};
 use rig::wall_clock_loop::WallClockLoop;
 use rig::wall_clock_loop::{LoopHandle, Parts};
 use runs::supervisor::Loop;
@@ -21,7 +21,7 @@ use tests::{file, setup};
 /// What becomes of a foreign write.
 enum Fate {
     /// The rig trips for one of these causes within so many ms.
-    Trips(&'static [Cause], u64),
+    Trips(&'static [TripCause], u64),
     /// Nothing shows it. Why, and what is left then.
     Unseen(&'static str),
 }
@@ -44,11 +44,11 @@ macro_rules! cases {
     };
 }
 
-use Cause::*;
 use Fate::{Trips, Unseen};
+use TripCause::*;
 
 /// Another drive, another frequency or another switch shows in the echo, or in the plate's motion.
-const DRIVE: &[Cause] = &[EchoMismatch, AmplitudeRunaway, DriveNoResponse, AmplitudeRate];
+const DRIVE: &[TripCause] = &[EchoMismatch, AmplitudeRunaway, DriveNoResponse, AmplitudeRate];
 const ANOTHER_LIFE: &str =
     "a second master that keeps feeding it outlives this program's end: the second channel is left";
 /// A chamber is beside the loop: what it measures goes with each pass (`runs/src/sweep/passing.rs`).

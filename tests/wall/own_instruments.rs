@@ -8,7 +8,7 @@
 #[path = "own/rows.rs"]
 mod rows;
 
-use realtime::safety::{Cause, Trip};
+use realtime::safety::{Trip, TripCause};
 use rows::{Fate, ROWS, Row};
 use runs::{Outcome, Summary};
 use std::io::{BufRead, BufReader, Read, Write};
@@ -376,7 +376,7 @@ fn silence_is_never_taken_for_a_force() {
     for row in ROWS.iter().filter(|row| row.fault == "silence" && FORCE.contains(&row.instrument)) {
         let Fate::Trips(causes, _) = &row.fate else { panic!("{row}: silence goes on") };
         assert!(
-            causes.iter().all(|cause| matches!(cause, Cause::LateralStale | Cause::NormalStale)),
+            causes.iter().all(|cause| matches!(cause, TripCause::LateralStale | TripCause::NormalStale)),
             "{row}"
         );
     }

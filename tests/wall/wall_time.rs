@@ -223,7 +223,7 @@ pub fn cut_by_a_stall(out: &Path) -> Option<String> {
         // An amplifier whose supply was cut for a stall has no fault: that cause is never forgiven.
         runs::sweep::Outcome::WouldNotArm { blocking }
             if stalls.worst.0 >= KEEPS_FROM_ARMING.0
-                && blocking != Some(realtime::safety::Cause::AmplifierFault) =>
+                && blocking != Some(realtime::safety::TripCause::AmplifierFault) =>
         {
             return Some(format!(
                 "would not arm, {blocking:?}, the machine stalled for {} ms",

@@ -4,7 +4,7 @@
 //! is run again, seven times at most); reactions are judged on the virtual amplifier's own clock.
 
 use realtime::Nanos;
-use realtime::safety::{Cause, Trip};
+use realtime::safety::{Trip, TripCause};
 use runs::{Outcome, Summary};
 use std::io::{BufRead, BufReader};
 use std::path::{Path, PathBuf};
@@ -44,22 +44,23 @@ struct Case {
     fault: &'static str,
     strength: f64,
     /// Causes that match it.
-    causes: &'static [Cause],
+    causes: &'static [TripCause],
     /// Time from the strike until the output is off, in ms; `None` where the fault blinds those who ask the amplifier.
     bound_ms: Option<f64>,
 }
 
-const FORCE: &[Cause] = &[Cause::LateralStale, Cause::NormalStale, Cause::LateralLossy, Cause::NormalLossy];
+const FORCE: &[TripCause] =
+    &[TripCause::LateralStale, TripCause::NormalStale, TripCause::LateralLossy, TripCause::NormalLossy];
 /// What random numbers over the whole range may be taken for.
-const WILD: &[Cause] = &[
-    Cause::LateralOverforce,
-    Cause::NormalOverforce,
-    Cause::ForceRate,
-    Cause::LateralInvalid,
-    Cause::NormalInvalid,
-    Cause::LateralSaturated,
-    Cause::NormalSaturated,
-    Cause::Noisy,
+const WILD: &[TripCause] = &[
+    TripCause::LateralOverforce,
+    TripCause::NormalOverforce,
+    TripCause::ForceRate,
+    TripCause::LateralInvalid,
+    TripCause::NormalInvalid,
+    TripCause::LateralSaturated,
+    TripCause::NormalSaturated,
+    TripCause::Noisy,
 ];
 
 const CASES: &[Case] = &[
@@ -78,7 +79,7 @@ const CASES: &[Case] = &[
         channel: "force",
         fault: "stuck",
         strength: 0.0,
-        causes: &[Cause::LateralFrozen, Cause::NormalFrozen],
+        causes: &[TripCause::LateralFrozen, TripCause::NormalFrozen],
         bound_ms: Some(50.0 * CYCLES_MADE_UP * CYCLE_MS),
     },
     Case { channel: "force", fault: "garbage", strength: 0.0, causes: WILD, bound_ms: Some(4.0 * CYCLE_MS) },
@@ -87,21 +88,21 @@ const CASES: &[Case] = &[
         channel: "stage",
         fault: "off",
         strength: 0.0,
-        causes: &[Cause::StageStale],
+        causes: &[TripCause::StageStale],
         bound_ms: Some(SILENT_MS + 20.0),
     },
     Case {
         channel: "stage",
         fault: "garbage",
         strength: 0.0,
-        causes: &[Cause::StageFault, Cause::OverTravel, Cause::StageNotFollowing],
+        causes: &[TripCause::StageFault, TripCause::OverTravel, TripCause::StageNotFollowing],
         bound_ms: Some(20.0),
     },
     Case {
         channel: "amplifier",
         fault: "off",
         strength: 0.0,
-        causes: &[Cause::AmplifierStale, Cause::AmplifierWatchdog],
+        causes: &[TripCause::AmplifierStale, TripCause::AmplifierWatchdog],
         bound_ms: None,
     },
     Case {
@@ -109,12 +110,12 @@ const CASES: &[Case] = &[
         fault: "garbage",
         strength: 0.0,
         causes: &[
-            Cause::OverAmplitude,
-            Cause::AmplitudeRunaway,
-            Cause::AmplitudeRate,
-            Cause::AmplifierFault,
-            Cause::OverTemperature,
-            Cause::DriveNoResponse,
+            TripCause::OverAmplitude,
+            TripCause::AmplitudeRunaway,
+            TripCause::AmplitudeRate,
+            TripCause::AmplifierFault,
+            TripCause::OverTemperature,
+            TripCause::DriveNoResponse,
         ],
         bound_ms: None,
     },
@@ -122,7 +123,7 @@ const CASES: &[Case] = &[
         channel: "amplifier",
         fault: "delayed",
         strength: 0.2,
-        causes: &[Cause::AmplifierStale],
+        causes: &[TripCause::AmplifierStale],
         bound_ms: None,
     },
 ];
@@ -347,7 +348,7 @@ fn a_stopped_controller_is_outlived_by_the_amplifiers_watchdog_and_trips_when_it
             }
             let (status, summary) = running.end();
             let trip = tripped(&summary).expect("a trip");
-            if trip.cause != Cause::Suspended {
+            if trip.cause != TripCause::Suspended {
                 let stall = stall_before(&summary, trip.at).unwrap_or_else(|| panic!("{trip:?}"));
                 return Err(format!("{:?}, the machine stalled for {stall:.0} ms", trip.cause));
             }
@@ -382,11 +383,11 @@ fn a_stopped_rig_trips_its_controller_and_is_off_when_it_goes_on() {
             let (status, summary) = running.end();
             let trip = tripped(&summary).expect("a trip");
             let silent = [
-                Cause::LateralStale,
-                Cause::NormalStale,
-                Cause::AmplifierStale,
-                Cause::StageStale,
-                Cause::AmplifierWatchdog,
+                TripCause::LateralStale,
+                TripCause::NormalStale,
+                TripCause::AmplifierStale,
+                TripCause::StageStale,
+                TripCause::AmplifierWatchdog,
             ];
             if !silent.contains(&trip.cause) {
                 let stall = stall_before(&summary, trip.at).unwrap_or_else(|| panic!("{trip:?}"));

@@ -3,8 +3,8 @@
 //! `w = w0 (1 - d + d |cos(2 pi (x - x0) / lambda)|)`: a standing wave with share `d`, on top of what travels
 //! and leaves no node. `d = 1` is that of a pure standing wave.
 
-use super::{AmplitudeError, AmplitudePoint, check, weighted};
-use crate::regression::{Fit, FitError, ends, nonlinear};
+use super::{AmplitudeError, AmplitudePoint, FitResult, check, weighted};
+use crate::regression::{Fit, ends, nonlinear};
 use std::f64::consts::PI;
 
 /// A fitted mode shape.
@@ -47,12 +47,7 @@ pub fn mode_shape(points: &[AmplitudePoint]) -> Result<ModeShape, AmplitudeError
 }
 
 /// Parameters: amplitude at an antinode over `top`, antinode, wavelength, standing share.
-fn best(
-    points: &[AmplitudePoint],
-    scatter: &[f64],
-    top: f64,
-    [length, middle]: [f64; 2],
-) -> Result<Fit, FitError> {
+fn best(points: &[AmplitudePoint], scatter: &[f64], top: f64, [length, middle]: [f64; 2]) -> FitResult {
     let y: Vec<f64> = points.iter().zip(scatter).map(|(p, s)| p.amplitude_pp_m / s).collect();
     let model = |i: usize, b: &[f64], g: &mut [f64]| {
         let angle = 2.0 * PI * (points[i].at - b[1]) / b[2];

@@ -1,7 +1,7 @@
 //! Resonance frequency and quality factor from a frequency sweep at constant drive.
 
-use super::{AmplitudeError, AmplitudePoint, check, weighted};
-use crate::regression::{Fit, FitError, ends, nonlinear};
+use super::{AmplitudeError, AmplitudePoint, FitResult, check, weighted};
+use crate::regression::{ends, nonlinear};
 
 /// The resonance that a sweep shows.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -46,12 +46,7 @@ pub fn sweep(points: &[AmplitudePoint]) -> Result<Resonance, AmplitudeError> {
 
 /// Parameters: f0, ln Q, ln w0, tilt (near -1/2 where a constant force drives a displacement, 0 for a pure
 /// Lorentzian); amplitudes weighted by their scatter.
-fn best(
-    points: &[AmplitudePoint],
-    scatter: &[f64],
-    top: &AmplitudePoint,
-    width: f64,
-) -> Result<Fit, FitError> {
+fn best(points: &[AmplitudePoint], scatter: &[f64], top: &AmplitudePoint, width: f64) -> FitResult {
     let y: Vec<f64> = points.iter().zip(scatter).map(|(p, s)| p.amplitude_pp_m / s).collect();
     let model = |i: usize, b: &[f64], g: &mut [f64]| {
         let (f0, q) = (b[0], b[1].exp());

@@ -7,8 +7,7 @@
 
 use super::{FingerError, enough};
 use models::pass::{Pass, coulomb_coefficient};
-use models::spring_slider;
-use models::{Condition, Finger, PassNoise, PeakToPeak};
+use models::{Condition, Finger, PassNoise, PeakToPeak, spring_slider};
 use nalgebra::{DMatrix, DVector};
 use statrs::distribution::{ChiSquared, ContinuousCDF, FisherSnedecor};
 
@@ -63,7 +62,7 @@ struct Row {
 
 /// One search: its place in (ln k_n, ln ratio, ln mu_0), and chi-square there.
 #[derive(Clone, Copy)]
-struct Found {
+struct Trial {
     at: [f64; 3],
     chi2: f64,
 }
@@ -94,8 +93,8 @@ pub fn springs(passes: &[Pass], noise: &PassNoise) -> Result<Springs, FingerErro
     let [ratios, stiffnesses] = [RATIO_RANGE, STIFFNESS_RANGE_N_PER_M].map(|range| range.map(f64::ln));
     let place = |range: [f64; 2], k: usize, n: usize| range[0] + (range[1] - range[0]) * k as f64 / n as f64;
     let of = |k| (0..=12).map(move |r| [place(stiffnesses, k, 16), place(ratios, r, 12), mu0.ln()]);
-    let looked = (0..=16).flat_map(of).map(|at| Found { at, chi2: chi2(&rows, at) });
-    let mut starts: Vec<Found> = looked.collect();
+    let looked = (0..=16).flat_map(of).map(|at| Trial { at, chi2: chi2(&rows, at) });
+    let mut starts: Vec<Trial> = looked.collect();
     starts.sort_by(|a, b| a.chi2.total_cmp(&b.chi2));
     let searched = starts[..3].iter().map(|s| search(&rows, *s, [true; 3]));
     let best = searched.min_by(|a, b| a.chi2.total_cmp(&b.chi2)).unwrap_or(starts[0]);
@@ -168,7 +167,7 @@ fn chi2(rows: &[Row], at: [f64; 3]) -> f64 {
 }
 
 /// Levenberg's search from a start in the quantities that are free.
-fn search(rows: &[Row], start: Found, free: [bool; 3]) -> Found {
+fn search(rows: &[Row], start: Trial, free: [bool; 3]) -> Trial {
     let axes: Vec<usize> = (0..3).filter(|k| free[*k]).collect();
     let (mut here, mut damping) = (start, 1e-3);
     for _ in 0..60 {
@@ -215,13 +214,13 @@ fn search(rows: &[Row], start: Found, free: [bool; 3]) -> Found {
 
 /// Where the profile along an axis passes what is allowed, towards `end` (`outwards` is 1 for the upper one,
 /// -1 for the lower); and whether it does. A best value beyond the range has no end there.
-fn profile_end(rows: &[Row], best: Found, axis: usize, end: f64, outwards: f64, allowed: f64) -> (f64, bool) {
+fn profile_end(rows: &[Row], best: Trial, axis: usize, end: f64, outwards: f64, allowed: f64) -> (f64, bool) {
     if (end - best.at[axis]) * outwards <= 0.0 {
         return (best.at[axis], false);
     }
     let mut free = [true; 3];
     free[axis] = false;
-    let at = |value: f64, from: Found| {
+    let at = |value: f64, from: Trial| {
         let mut start = from;
         start.at[axis] = value;
         start.chi2 = chi2(rows, start.at);
@@ -311,7 +310,7 @@ mod tests {
     #[test]
     fn a_best_value_beyond_the_range_has_no_end_there() {
         let rows: Vec<Row> = Vec::new();
-        let best = Found { at: [0.0, 2.0, 0.0], chi2: 0.0 };
+        let best = Trial { at: [0.0, 2.0, 0.0], chi2: 0.0 };
         assert_eq!(profile_end(&rows, best, 1, 1.0, 1.0, 4.0), (2.0, false));
         assert_eq!(profile_end(&rows, best, 1, 3.0, -1.0, 4.0), (2.0, false));
     }

@@ -8,7 +8,7 @@ use studies::cases::kinds::blind::run as score_all;
 use studies::progress::Study;
 use studies::validation::blind::distance::by_cause;
 use studies::validation::blind::reliability::{diagram, identifiable};
-use studies::validation::blind::{Scored, Settings, confusion, figures};
+use studies::validation::blind::{BlindStudy, Scored, confusion, figures};
 
 /// Score the diagnosis on sealed sets of the independent simulation.
 #[derive(Debug, clap::Args)]
@@ -17,7 +17,7 @@ pub struct Args {
     #[arg(long, default_value_t = 100, value_parser = RangedU64ValueParser::<usize>::new().range(1..))]
     pub sets: usize,
     #[command(flatten)]
-    pub of: Settings,
+    pub of: BlindStudy,
     /// Write the sets to this folder (open and sealed parts apart) for other diagnosers; none is scored.
     #[arg(long, value_name = "DIR")]
     pub write: Option<std::path::PathBuf>,

@@ -28,7 +28,7 @@ enum What {
     /// Point tables or runs, to be diagnosed
     Diagnose(Diagnose),
     /// Phase tables of fingers, to be identified
-    Finger(Finger),
+    Finger(FingerArgs),
     /// Cases that only hash: for measuring an engine
     Noop(Noop),
 }
@@ -86,7 +86,7 @@ struct Blind {
     #[arg(long, default_value_t = 100)]
     sets: u64,
     #[command(flatten)]
-    settings: blind::Settings,
+    settings: blind::BlindStudy,
 }
 
 #[derive(Debug, clap::Args)]
@@ -102,11 +102,11 @@ struct Diagnose {
     #[arg(long)]
     rig: Option<PathBuf>,
     #[command(flatten)]
-    settings: diagnose::Settings,
+    settings: diagnose::DiagnosisSettings,
 }
 
 #[derive(Debug, clap::Args)]
-struct Finger {
+struct FingerArgs {
     #[command(flatten)]
     to: To,
     /// Phase tables, one a finger
@@ -136,7 +136,7 @@ struct Noop {
     #[arg(long)]
     cases: u64,
     #[command(flatten)]
-    settings: noop::Settings,
+    settings: noop::NoopSettings,
 }
 
 /// Files that were named, absolute: a study may stand elsewhere.
@@ -251,7 +251,7 @@ pub fn run(args: Args, json: bool) -> miette::Result<ExitCode> {
             let steady = Steady { tolerance: a.tolerance, at_most: a.at_most, ..Steady::default() };
             let (elements, base, spans) = (a.elements, values(&a.set)?, spans(&a.span)?);
             let lines = a.from.as_deref().map(|path| rows(path, &base)).transpose()?;
-            let settings = ridge::Settings { elements, steady, base, spans, first: a.first, case: None };
+            let settings = ridge::RidgeSettings { elements, steady, base, spans, first: a.first, case: None };
             settings.check_spans()?;
             write("ridge", &a.to, a.draw.unwrap_or(0), &settings, lines.as_deref(), json)
         }
@@ -269,7 +269,7 @@ pub fn run(args: Args, json: bool) -> miette::Result<ExitCode> {
             let line = |phases| finger::Line { phases, frequency_hz, normal_force_n };
             let lines = lines(&a.phases, a.list.as_deref(), line)?;
             let (elements, modulus_only) = (a.elements, a.modulus_only);
-            let settings = finger::Settings { elements, modulus_only, ..finger::Settings::default() };
+            let settings = finger::FingerSettings { elements, modulus_only, ..Default::default() };
             write("finger", &a.to, 0, &settings, Some(&lines), json)
         }
         What::Noop(a) => write("noop", &a.to, a.cases, &a.settings, None, json),

@@ -1,7 +1,7 @@
 //! `muprime diagnose`: where the gap lies, which effect causes it, how far it shrinks.
 
 use super::prelude::*;
-use diagnosis::progress::{Progress, Stage};
+use diagnosis::progress::{Progress, ProgressReport};
 use diagnosis::report::document::{document, outside, predictions};
 use diagnosis::{Diagnosis, Options, Table};
 use indicatif::ProgressBar;
@@ -281,7 +281,7 @@ fn keep_in_run(run: &Path, page: &Path, text: &str) {
 
 /// A bar that follows a diagnosis; Ctrl-C prints the effects that lead so far.
 fn follow(bar: &ProgressBar, json: bool) -> miette::Result<Progress> {
-    let reached: Arc<Mutex<Option<Stage>>> = Arc::default();
+    let reached: Arc<Mutex<Option<ProgressReport>>> = Arc::default();
     let latest = Arc::clone(&reached);
     studies::progress::on_interrupt(bar, move |_| {
         let stage = reached.lock().unwrap_or_else(PoisonError::into_inner).clone();
@@ -294,12 +294,12 @@ fn follow(bar: &ProgressBar, json: bool) -> miette::Result<Progress> {
         bar.set_message(stage.doing);
         let mut reached = latest.lock().unwrap_or_else(PoisonError::into_inner);
         let leading = reached.take().map(|before| before.leading).filter(|_| stage.leading.is_empty());
-        *reached = Some(Stage { leading: leading.unwrap_or(stage.leading), ..stage });
+        *reached = Some(ProgressReport { leading: leading.unwrap_or(stage.leading), ..stage });
     }))
 }
 
 /// What a diagnosis that was stopped knew.
-fn tell_partial(stage: Option<&Stage>, json: bool) {
+fn tell_partial(stage: Option<&ProgressReport>, json: bool) {
     let leading: &[_] = stage.map_or(&[], |stage| &stage.leading);
     let (doing, share) = stage.map_or(("reading", 0.0), |stage| (stage.doing, stage.share));
     if json {

@@ -2,7 +2,7 @@
 
 use super::prelude::*;
 use std::sync::{Arc, Mutex, PoisonError};
-use studies::cases::kinds::faults::{Settings, search};
+use studies::cases::kinds::faults::{FaultSettings, search};
 use studies::validation::faults::scene::{Scene, run as run_scene};
 use studies::validation::faults::{Pace, Tally};
 
@@ -28,9 +28,9 @@ pub struct Scenes {
 
 impl Scenes {
     /// What all of them share.
-    pub fn settings(self) -> Settings {
+    pub fn settings(self) -> FaultSettings {
         let pace = if self.default_limits { Pace::Default } else { Pace::Fast };
-        Settings { first: self.first, pairs: self.pairs, twice: self.twice, pace }
+        FaultSettings { first: self.first, pairs: self.pairs, twice: self.twice, pace }
     }
 }
 

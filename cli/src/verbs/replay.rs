@@ -19,7 +19,7 @@ pub struct Args {
 
 /// What a replay of one record came to.
 #[derive(serde::Serialize)]
-struct Found {
+struct ReplayResult {
     record: PathBuf,
     replay: Replay,
     /// What the record has lost, and where.
@@ -55,7 +55,7 @@ pub fn run(args: Args, json: bool) -> miette::Result<ExitCode> {
     exit(if holds { DONE } else { FAILED })
 }
 
-fn tell(found: &Found) {
+fn tell(found: &ReplayResult) {
     let Replay { cycles, equal, missing, first_difference } = &found.replay;
     out!("{}: {equal} of {cycles} cycles decide as recorded", found.record.display());
     found.integrity.sentences().iter().for_each(|sentence| out!("  {sentence}"));
@@ -70,7 +70,7 @@ fn tell(found: &Found) {
     }
 }
 
-fn again(path: PathBuf) -> miette::Result<Found> {
+fn again(path: PathBuf) -> miette::Result<ReplayResult> {
     let shown = path.display().to_string();
     let reader = || {
         let file = File::open(&path).into_diagnostic().wrap_err_with(|| shown.clone())?;
@@ -103,7 +103,7 @@ fn again(path: PathBuf) -> miette::Result<Found> {
     // Cycles that the last words count and that never came stand behind the last that did.
     replayed.missing = replayed.missing.max(integrity.missing(CYCLES));
     let holds = replayed.holds() && integrity.intact() && integrity.missing.is_empty();
-    Ok(Found { record: path, replay: replayed, integrity, holds })
+    Ok(ReplayResult { record: path, replay: replayed, integrity, holds })
 }
 
 fn model_of(files: &[(String, Vec<u8>)], built: &Replayable) -> miette::Result<Arc<dyn FrictionModel>> {

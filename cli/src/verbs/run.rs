@@ -10,7 +10,7 @@ use realtime::Nanos;
 use rig::dashboard::LISTEN;
 use rig::live::{self, Feed};
 use rig::publish::{Broker, Publisher};
-use rig::watch::Watch;
+use rig::watch::TerminalView;
 use runs::catalogue::runs_folder;
 use runs::files::{Made, make_folder};
 use runs::job::{Job, Notes, Signals, Summary, Update, unix_ns};
@@ -150,7 +150,7 @@ fn measure(job: Job, planned: usize, args: &Args, signals: &Signals, json: bool)
     keys_are_free(&job, args.tui)?;
     // Up before anything moves, and down before the summary. Output in between is held and printed then.
     let watch = match args.tui {
-        true => Some(Watch::begin(&job.out, Some(signals.clone()), job.setup.hand_at_key())?),
+        true => Some(TerminalView::begin(&job.out, Some(signals.clone()), job.setup.hand_at_key())?),
         false => None,
     };
     let mut followers = Followers::begin(&job, planned, args, json)?;

@@ -1,7 +1,7 @@
 //! `muprime watch RUN`: follows a run, at a terminal with the live view, else line by line from its journal.
 
 use super::prelude::*;
-use rig::watch::Watch;
+use rig::watch::TerminalView;
 use runs::MeasuredPass;
 use runs::catalogue::{existing, runs_folder};
 use std::io::{BufRead, BufReader, IsTerminal};
@@ -25,7 +25,7 @@ pub fn run(args: Args, json: bool) -> miette::Result<ExitCode> {
     if !json && std::io::stdout().is_terminal() && rig::terminal::has_keys().is_ok() {
         // A signal takes the view down, and nothing else: the run is another process's.
         studies::progress::on_signals(&rig::terminal::STOPS, || runs::exit::exit_now(DONE))?;
-        Watch::begin(&run, None, false)?.wait();
+        TerminalView::begin(&run, None, false)?.wait();
         return exit(DONE);
     }
     let mut reader = BufReader::new(file);

@@ -26,12 +26,7 @@ pub struct Candidate {
 
 impl Candidate {
     /// A hypothesis whose probability is not known yet.
-    pub(crate) fn new(
-        effects: Vec<usize>,
-        log_evidence: f64,
-        best: Posterior,
-        laws: Vec<(f64, Posterior)>,
-    ) -> Self {
+    pub fn new(effects: Vec<usize>, log_evidence: f64, best: Posterior, laws: Vec<(f64, Posterior)>) -> Self {
         Candidate { effects, log_evidence, best, laws, probability: 0.0, log_probability: f64::NEG_INFINITY }
     }
 
@@ -69,9 +64,9 @@ pub struct Fitted {
     /// What the table says about its own scatter.
     pub scatter: Scatter,
     /// Recalibrated baseline.
-    pub none: Posterior,
+    pub baseline: Posterior,
     /// Probability of no gap.
-    pub none_probability: f64,
+    pub no_gap_probability: f64,
     /// The open set's smooth departure of any kind.
     pub discrepancy: Discrepancy,
     /// Causes of known form that the library does not name, best first: part of the open set.
@@ -82,9 +77,11 @@ pub struct Fitted {
     /// Jumps, bumps and periods beside the recalibrated baseline, strongest first.
     pub shapes: Vec<Shape>,
     /// Probability of the open set.
-    pub unknown_probability: f64,
-    /// Log evidences of no gap and of the open set's smooth part.
-    pub evidence: [f64; 2],
+    pub open_set_probability: f64,
+    /// Log evidence of no gap.
+    pub no_gap_evidence: f64,
+    /// Log evidence of the open set's smooth part.
+    pub smooth_evidence: f64,
     /// Number of single causes that were tried.
     pub tried: usize,
     /// Single effects and pairs, most probable first.
@@ -104,7 +101,7 @@ pub(crate) struct Coarse {
     /// Of no gap.
     pub no_gap: f64,
     /// Of the open set.
-    pub open: f64,
+    pub open_set: f64,
     /// Of the candidates, in their order.
     pub each: Vec<f64>,
     /// Of the pairs that were not weighed.
@@ -118,15 +115,14 @@ impl Fitted {
     /// scatter is exactly that of the rig, and as often as the evidence is taken at its word it is too sure.
     pub fn weigh(&mut self) {
         let k = self.problem.constants.clone();
-        let [none, smooth] = self.evidence;
-        let beside = |evidence: f64| (evidence - none) / k.temper;
+        let beside = |evidence: f64| (evidence - self.no_gap_evidence) / k.temper;
         // What the calibration says of the nuisances is a prior, and a prior is not tempered: a baseline that
         // needs a stiffness far from its certificate pays for that in full.
         let pull = |nuisances: &[f64]| 0.5 * nuisances.iter().map(|u| u * u).sum::<f64>();
-        let own = pull(&self.none.u[..NUISANCES]);
+        let own = pull(&self.baseline.u[..NUISANCES]);
         let spared = |nuisances: &[f64]| (1.0 - 1.0 / k.temper) * (own - pull(nuisances));
         let weight = |c: &Candidate| beside(c.log_evidence) + spared(&c.best.u[..NUISANCES]);
-        let smooth = beside(smooth) + spared(self.discrepancy.nuisances());
+        let smooth = beside(self.smooth_evidence) + spared(self.discrepancy.nuisances());
         // A structure's nats are those of a p-value, which no law enters.
         let rough = self.structure.as_ref().map_or(f64::NEG_INFINITY, Structure::nats);
         let share = k.structure_share;
@@ -135,8 +131,8 @@ impl Fitted {
         let open = log_sum_exp(&parts.map(|(nats, share)| nats + share.ln()));
         let mut all: Vec<f64> =
             self.candidates.iter().map(|c| weight(c) + self.log_prior(c.effects.len())).collect();
-        let (no_gap, unknown) = (k.prior_null.ln(), open + k.prior_open.ln());
-        all.extend([no_gap, unknown]);
+        let (no_gap, open_set) = (k.prior_no_gap.ln(), open + k.prior_open_set.ln());
+        all.extend([no_gap, open_set]);
         let total = log_sum_exp(&all);
         // The rest of each hypothesis' weight is no gap's: see `log_shown_share`.
         let mut rest = 1.0;
@@ -145,22 +141,21 @@ impl Fitted {
             c.probability = c.log_probability.exp();
             rest -= c.probability;
         }
-        self.unknown_probability = (unknown - total + log_shown_share(open, 0.0)).exp();
+        self.open_set_probability = (open_set - total + log_shown_share(open, 0.0)).exp();
         // Where hypotheses take all but rounding, no gap's own weight is the better number.
-        self.none_probability = (rest - self.unknown_probability).max((no_gap - total).exp());
+        self.no_gap_probability = (rest - self.open_set_probability).max((no_gap - total).exp());
         self.candidates
             .sort_by(|a, b| b.log_probability.total_cmp(&a.log_probability).then(a.effects.cmp(&b.effects)));
     }
 
     /// Log evidence of the open set over no gap's: a smooth map, or a structure that is described.
     fn open_nats(&self) -> f64 {
-        let [none, smooth] = self.evidence;
-        (smooth - none).max(shapes::nats(&self.shapes))
+        (self.smooth_evidence - self.no_gap_evidence).max(shapes::nats(&self.shapes))
     }
 
     /// Nats by which a candidate's evidence leads the open set's, and no gap's.
     pub(crate) fn lead(&self, candidate: &Candidate) -> f64 {
-        candidate.log_evidence - self.evidence[0] - self.open_nats().max(0.0)
+        candidate.log_evidence - self.no_gap_evidence - self.open_nats().max(0.0)
     }
 
     /// Probabilities as they would be if the evidence counted for next to nothing: all that stands where the
@@ -168,19 +163,18 @@ impl Fitted {
     /// does, where the other's size is nothing: it has that evidence.
     pub(crate) fn coarse(&self) -> Coarse {
         let k = &self.problem.constants;
-        let none = self.evidence[0];
-        let weight =
-            |effects: usize, evidence: f64| self.log_prior(effects) + (evidence - none) / k.doubt_temper;
+        let beside = |evidence: f64| (evidence - self.no_gap_evidence) / k.doubt_temper;
+        let weight = |effects: usize, evidence: f64| self.log_prior(effects) + beside(evidence);
         let singles = self.candidates.iter().filter(|c| c.effects.len() == 1);
         let alone: BTreeMap<usize, f64> = singles.map(|c| (c.effects[0], c.log_evidence)).collect();
-        let mut all = vec![k.prior_null.ln(), k.prior_open.ln() + self.open_nats() / k.doubt_temper];
+        let mut all = vec![k.prior_no_gap.ln(), k.prior_open_set.ln() + self.open_nats() / k.doubt_temper];
         all.extend(self.candidates.iter().map(|c| weight(c.effects.len(), c.log_evidence)));
         all.extend(self.unweighed.iter().map(|[a, b]| weight(2, alone[a].max(alone[b]))));
         let total = log_sum_exp(&all);
         let mut all = all.into_iter().map(|v| (v - total).exp());
-        let (no_gap, open) = (all.next().unwrap_or(0.0), all.next().unwrap_or(0.0));
+        let (no_gap, open_set) = (all.next().unwrap_or(0.0), all.next().unwrap_or(0.0));
         let each = all.by_ref().take(self.candidates.len()).collect();
-        Coarse { no_gap, open, each, unweighed: all.collect() }
+        Coarse { no_gap, open_set, each, unweighed: all.collect() }
     }
 
     /// Logarithm of the prior probability of one hypothesis with so many effects.
@@ -197,7 +191,7 @@ impl Fitted {
     /// Log evidence of the best hypothesis.
     pub(crate) fn best_evidence(&self) -> f64 {
         let own = self.candidates.iter().map(|c| c.log_evidence);
-        own.chain(self.evidence).fold(f64::NEG_INFINITY, f64::max)
+        own.chain([self.no_gap_evidence, self.smooth_evidence]).fold(f64::NEG_INFINITY, f64::max)
     }
 
     /// Variances of single passes at conditions of a problem, given the level of friction there, N^2: of runs
@@ -217,8 +211,8 @@ impl Fitted {
 /// cause at most the evidence of no gap; that part of its weight says that there is nothing to be seen, and
 /// counts for no gap. Without, tables without a gap were given 0.75 to 0.93 for none where that was right in
 /// 99 of 100.
-fn log_shown_share(evidence: f64, none: f64) -> f64 {
-    let behind = none - evidence;
+fn log_shown_share(evidence: f64, no_gap: f64) -> f64 {
+    let behind = no_gap - evidence;
     // The logarithm of one and an exponential, which must not overflow.
     -(behind.max(0.0) + (-behind.abs()).exp().ln_1p())
 }

@@ -52,7 +52,7 @@ fn with_every_law(
     problem: &Problem,
     mut pairs: Vec<Posterior>,
     singles: &[Candidate],
-    loose: &[f64],
+    tempered: &[f64],
     basis: &Basis,
 ) -> Vec<Posterior> {
     let effects = |p: &Posterior| effects_of(&p.members);
@@ -64,9 +64,9 @@ fn with_every_law(
     let again: Vec<Posterior> = best
         .par_iter()
         .flat_map(|effects| {
-            law_starts(problem, effects, &pairs, singles, loose)
+            law_starts(problem, effects, &pairs, singles, tempered)
                 .into_par_iter()
-                .filter_map(|start| refined(problem, start, loose, basis))
+                .filter_map(|start| refined(problem, start, tempered, basis))
                 .collect::<Vec<_>>()
         })
         .collect();
@@ -86,7 +86,7 @@ fn law_starts(
     effects: &[usize],
     pairs: &[Posterior],
     singles: &[Candidate],
-    loose: &[f64],
+    tempered: &[f64],
 ) -> Vec<Start> {
     let k = &problem.constants;
     // Singles come best first: the stronger one stays while the other is sought.
@@ -110,7 +110,7 @@ fn law_starts(
         .flat_map_iter(|(first, fixed, second)| {
             let members = vec![*first, *second];
             nuisance_starts(fixed, k.driven_sd).into_iter().filter_map(move |fixed| {
-                let (cost, u) = Hunt { problem, members: &members, variance: loose }.full_scan(&fixed)?;
+                let (cost, u) = Hunt { problem, members: &members, variance: tempered }.full_scan(&fixed)?;
                 Some(Start { cost, members: members.clone(), u })
             })
         })
@@ -128,9 +128,9 @@ fn law_starts(
 }
 
 /// The mode of a pair from one start.
-fn refined(problem: &Problem, start: Start, loose: &[f64], basis: &Basis) -> Option<Posterior> {
+fn refined(problem: &Problem, start: Start, tempered: &[f64], basis: &Basis) -> Option<Posterior> {
     let members = &start.members;
-    let fit = Hunt { problem, members, variance: loose }.refine_from(start.u)?;
+    let fit = Hunt { problem, members, variance: tempered }.refine_from(start.u)?;
     let freedom = middle_freedom(&problem.constants, members);
     Some(laplace(problem, members, &fit.u, basis, freedom, ROUNDS[0]))
 }
@@ -161,7 +161,7 @@ fn twins(problem: &Problem, singles: &[Candidate], pair: &Posterior) -> Vec<(Vec
 fn beside_a_function(
     problem: &Problem,
     singles: &[Candidate],
-    loose: &[f64],
+    tempered: &[f64],
     basis: &Basis,
 ) -> Vec<Posterior> {
     let k = &problem.constants;
@@ -172,10 +172,10 @@ fn beside_a_function(
     let taken = leader.departure_n(basis);
     let lateral = problem.lateral.iter().zip(taken.iter()).map(|(all, taken)| all - taken).collect();
     let rest = Problem { lateral, ..problem.clone() };
-    let mut starts = coarse_starts(&rest, &singles[..1], singles, loose);
+    let mut starts = coarse_starts(&rest, &singles[..1], singles, tempered);
     starts.truncate(k.pairs_searched);
     let found = starts.into_par_iter().filter_map(|start| {
-        let hunt = Hunt { problem: &rest, members: &start.members, variance: loose };
+        let hunt = Hunt { problem: &rest, members: &start.members, variance: tempered };
         let fit = hunt.refine_from(start.u)?;
         let bent = Freedom { share: middle_freedom(k, &start.members).share, ..leader.freedom };
         Some(laplace(problem, &start.members, &fit.u, basis, bent, ROUNDS[0]))
@@ -184,7 +184,12 @@ fn beside_a_function(
 }
 
 /// Places of pairs by a coarse scan, best first: each seed with every other effect in each of its laws.
-fn coarse_starts(problem: &Problem, seeds: &[Candidate], singles: &[Candidate], loose: &[f64]) -> Vec<Start> {
+fn coarse_starts(
+    problem: &Problem,
+    seeds: &[Candidate],
+    singles: &[Candidate],
+    tempered: &[f64],
+) -> Vec<Start> {
     let k = &problem.constants;
     let jobs: Vec<(usize, &Posterior)> = (0..seeds.len())
         .flat_map(|s| singles.iter().flat_map(|c| &c.laws).map(move |(_, e)| (s, e)))
@@ -200,7 +205,7 @@ fn coarse_starts(problem: &Problem, seeds: &[Candidate], singles: &[Candidate], 
             let alone = &e.u[NUISANCES..];
             // A cause that acts as a gain of the stiffness, the amplitude or the speed hides in the
             // stiffnesses that the single drove to imitate it.
-            let hunt = Hunt { problem, members: &members, variance: loose };
+            let hunt = Hunt { problem, members: &members, variance: tempered };
             nuisance_starts(&seed.u, k.driven_sd)
                 .iter()
                 .filter_map(|fixed| hunt.coarse_scan(fixed, alone))
@@ -224,20 +229,20 @@ fn coarse_starts(problem: &Problem, seeds: &[Candidate], singles: &[Candidate], 
 }
 
 /// Pairs grown from the best singles, each with every other effect in each of its laws.
-pub fn pairs(problem: &Problem, singles: &[Candidate], loose: &[f64], basis: &Basis) -> Vec<Candidate> {
+pub fn pairs(problem: &Problem, singles: &[Candidate], tempered: &[f64], basis: &Basis) -> Vec<Candidate> {
     let k = &problem.constants;
     let seeds = &singles[..singles.len().min(k.pair_seeds)];
-    let mut first: Vec<Posterior> = coarse_starts(problem, seeds, singles, loose)
+    let mut first: Vec<Posterior> = coarse_starts(problem, seeds, singles, tempered)
         .into_par_iter()
         .filter_map(|start| {
             nuisance_starts(&start.u, k.driven_sd)
                 .into_iter()
-                .filter_map(|u| refined(problem, Start { u, ..start.clone() }, loose, basis))
+                .filter_map(|u| refined(problem, Start { u, ..start.clone() }, tempered, basis))
                 .max_by(|a, b| a.log_evidence.total_cmp(&b.log_evidence))
         })
         .collect();
-    first.extend(beside_a_function(problem, singles, loose, basis));
-    let mut found = with_every_law(problem, first, singles, loose, basis);
+    first.extend(beside_a_function(problem, singles, tempered, basis));
+    let mut found = with_every_law(problem, first, singles, tempered, basis);
     let twins: Vec<Posterior> = found
         .par_iter()
         .flat_map_iter(|pair| twins(problem, singles, pair))
@@ -255,8 +260,7 @@ fn weighed(problem: &Problem, pairs: Vec<Posterior>, basis: &Basis) -> Vec<Candi
     let k = &problem.constants;
     let top = pairs.iter().map(|p| p.log_evidence).fold(f64::NEG_INFINITY, f64::max);
     // By their laws the best pairs may be far behind a bent one, and not where they are bent too.
-    let mut by_law: Vec<f64> =
-        pairs.iter().filter(|p| p.freedom.bend == 0.0).map(|p| p.log_evidence).collect();
+    let mut by_law: Vec<_> = pairs.iter().filter(|p| p.freedom.bend == 0.0).map(|p| p.log_evidence).collect();
     by_law.sort_by(|a, b| b.total_cmp(a));
     let nth = by_law.get(k.pair_seeds).copied().unwrap_or(f64::NEG_INFINITY);
     let weighed: Vec<(f64, Posterior)> = pairs

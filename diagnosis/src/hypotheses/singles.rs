@@ -27,7 +27,7 @@ const OUTRUN: f64 = 2.0;
 /// What the searches share: where the nuisances start, tempered variances, and the form's basis.
 pub(crate) struct Search<'a> {
     pub nuisances: &'a [f64],
-    pub loose: &'a [f64],
+    pub tempered: &'a [f64],
     pub basis: &'a Basis,
     /// Receives the progress of the search.
     pub progress: &'a Progress,
@@ -109,7 +109,7 @@ fn each_law(problem: &Problem, members: &[Member], search: &Search<'_>) -> Vec<O
         .with_max_len(1)
         .map(|member| {
             let fixed = nuisance_starts(search.nuisances, k.driven_sd);
-            let sought = fixed.iter().map(|fixed| seek(problem, *member, fixed, search.loose)).collect();
+            let sought = fixed.iter().map(|fixed| seek(problem, *member, fixed, search.tempered)).collect();
             report(SINGLES_END);
             sought
         })
@@ -123,9 +123,9 @@ fn each_law(problem: &Problem, members: &[Member], search: &Search<'_>) -> Vec<O
         .map(|(member, sought)| {
             let finish = |s: Sought| {
                 if outrun(s.cost()) {
-                    s.as_it_is(problem, *member, search.loose)
+                    s.as_it_is(problem, *member, search.tempered)
                 } else {
-                    s.finished(problem, *member, search.loose)
+                    s.finished(problem, *member, search.tempered)
                 }
             };
             let mut fits: Vec<Fit> = sought.into_iter().flat_map(finish).collect();
@@ -174,8 +174,7 @@ fn each_law(problem: &Problem, members: &[Member], search: &Search<'_>) -> Vec<O
 /// Laws that are weighed however far behind they are, for their size may be a function of the place or the
 /// weather: the best law of each of the best causes.
 fn sized(problem: &Problem, middle: &[Option<Posterior>], basis: &Basis) -> Vec<usize> {
-    let mut best: Vec<(usize, &Posterior)> =
-        middle.iter().enumerate().filter_map(|(i, e)| Some((i, e.as_ref()?))).collect();
+    let mut best: Vec<_> = middle.iter().enumerate().filter_map(|(i, e)| Some((i, e.as_ref()?))).collect();
     best.retain(|(_, e)| basis.bends(&e.members, Bends::Size));
     best.sort_by(|a, b| b.1.log_evidence.total_cmp(&a.1.log_evidence));
     let mut seen = BTreeSet::new();

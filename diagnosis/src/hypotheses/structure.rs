@@ -14,8 +14,7 @@ mod locations;
 mod scatter_model;
 pub mod shapes;
 
-use crate::regression::Posterior;
-use crate::regression::Problem;
+use crate::regression::{Posterior, Problem};
 use crate::scatter::{moments, shuffled, strongest};
 use models::covariate::{COVARIATES, CovariateRole};
 use nalgebra::{DMatrix, DVector};

@@ -4,8 +4,7 @@
 //! on one input (the amplitude, say) by a size that is a function of few covariates (of time alone), that
 //! function may be any smooth one: the mechanism stays, the formula goes.
 
-use crate::regression::{Basis, Bends, goes_with_place};
-use crate::regression::{Layout, Member, NUISANCES, Problem, Recalibration};
+use crate::regression::{Basis, Bends, Layout, Member, NUISANCES, Problem, Recalibration, goes_with_place};
 use models::covariate::{Covariate, CovariateRole};
 use nalgebra::{DMatrix, DVector};
 
@@ -161,12 +160,7 @@ fn slope(
 }
 
 /// Forces of a hypothesis at coordinates, N, with one of its members left out.
-pub(crate) fn without_member(
-    problem: &Problem,
-    members: &[Member],
-    u: &[f64],
-    member: usize,
-) -> DVector<f64> {
+pub fn without_member(problem: &Problem, members: &[Member], u: &[f64], member: usize) -> DVector<f64> {
     let (mut rest, mut v) = (members.to_vec(), u.to_vec());
     rest.remove(member);
     v.drain(Layout::of(members).member(member));
@@ -234,7 +228,7 @@ mod tests {
     fn a_detuning_that_comes_back_is_a_detuning() {
         let table = through_a_resonance();
         let mut problem = Problem::new(&table, &rig(), &Default::default());
-        crate::scatter::noise::settle(&table, &rig(), &mut problem, &crate::scatter::Belief::Judged);
+        crate::scatter::noise::settle(&table, &rig(), &mut problem, &crate::scatter::Belief::ByResidual);
         let effect = (0..effects::library().len())
             .find(|&e| effects::library()[e].name == by_name("resonance_detuning").map_or("", |e| e.name))
             .unwrap();

@@ -300,7 +300,7 @@ mod tests {
     fn a_law_without_effect_gains_nothing() {
         let table = table(&mut Deviates(11), 0.0);
         let mut problem = Problem::new(&table, &rig(), &Default::default());
-        crate::scatter::noise::settle(&table, &rig(), &mut problem, &crate::scatter::Belief::Judged);
+        crate::scatter::noise::settle(&table, &rig(), &mut problem, &crate::scatter::Belief::ByResidual);
         let all: Vec<usize> = (0..effects::library().len()).collect();
         let basis = Kernels::on(&problem, &table, &all).at(&problem.passes);
         let none = minimise(&problem, &[], &[0.0; NUISANCES], &problem.variance, 15);

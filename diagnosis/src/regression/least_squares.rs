@@ -27,13 +27,7 @@ pub struct Fit {
 }
 
 /// Levenberg-Marquardt with projection onto the bounds; weights are the inverse variances.
-pub fn minimise(
-    problem: &Problem,
-    members: &[Member],
-    start: &[f64],
-    variance: &[f64],
-    rounds: usize,
-) -> Fit {
+pub fn minimise(problem: &Problem, members: &[Member], from: &[f64], variance: &[f64], rounds: usize) -> Fit {
     let bounds = problem.bounds(members);
     let precision = problem.prior_precision(members);
     let n = problem.len();
@@ -41,7 +35,7 @@ pub fn minimise(
         let misfit: f64 = (0..n).map(|i| (problem.lateral[i] - m[i]).powi(2) / variance[i]).sum();
         misfit + u.iter().zip(&precision).map(|(x, p)| p * x * x).sum::<f64>()
     };
-    let mut u: Vec<f64> = start.iter().zip(&bounds).map(|(x, b)| x.clamp(b.0, b.1)).collect();
+    let mut u: Vec<f64> = from.iter().zip(&bounds).map(|(x, b)| x.clamp(b.0, b.1)).collect();
     let mut m = problem.predict(members, &u);
     let mut cost = cost_of(&u, &m);
     if rounds == 0 {

@@ -1,7 +1,6 @@
 //! What recalibrating the baseline can imitate of a hypothesis' change.
 
-use crate::regression::NUISANCES;
-use crate::regression::Problem;
+use crate::regression::{NUISANCES, Problem};
 use nalgebra::{DMatrix, DVector};
 
 /// A hypothesis' change, and the recalibration that imitates it best.

@@ -1,7 +1,6 @@
 //! Global starts: a scan of each law, then fits of the best few. docs/diagnosis/model.md, section 7.
 
-use crate::regression::weighted;
-use crate::regression::{Covariance, Fit, Member, NUISANCES, Problem, minimise};
+use crate::regression::{Covariance, Fit, Member, NUISANCES, Problem, minimise, weighted};
 use effects::{Parameter, Prior};
 use nalgebra::{DMatrix, DVector};
 

@@ -7,7 +7,7 @@ use crate::Verdict;
 use crate::data::{RigFile, Table};
 use crate::scatter::Scatter;
 use models::PassNoise;
-use models::reading_evidence::{self, Decision, ReadingFinding};
+use models::reading_evidence::{self, ReadingDecision, ReadingFinding};
 
 /// The finding of a table: suspects left out, with the scatter that the table has and what certificates leave
 /// open of amplitude and speed. `None` without a pass with and one without vibration.
@@ -25,7 +25,7 @@ pub fn of_table(table: &Table, rig: &RigFile, scatter: &Scatter) -> Option<Readi
 
 /// The remark of a finding; none where the passes tell too little.
 pub fn remark(finding: Option<&ReadingFinding>, verdict: Verdict) -> Option<String> {
-    let finding = finding.filter(|f| f.decision != Decision::TooLittle)?;
+    let finding = finding.filter(|f| f.decision != ReadingDecision::TooLittle)?;
     let as_measured = match verdict {
         Verdict::NoGap => "",
         _ => " These are the passes as measured: the cause of the gap moves Psi* too.",

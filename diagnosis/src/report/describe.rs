@@ -78,7 +78,7 @@ pub fn description(fitted: &Fitted, decision: &Decision) -> Vec<Description> {
         return Vec::new();
     }
     let base10 = fitted.problem.constants.temper * LN_10;
-    let best = fitted.candidates.iter().map(|c| c.log_evidence - fitted.evidence[0]).reduce(f64::max);
+    let best = fitted.candidates.iter().map(|c| c.log_evidence - fitted.no_gap_evidence).reduce(f64::max);
     let of = |shape: &Shape| Description {
         structure: shape.kind,
         covariate: shape.covariate.name,
@@ -108,7 +108,7 @@ pub fn description(fitted: &Fitted, decision: &Decision) -> Vec<Description> {
 pub fn not_named(fitted: &Fitted, decision: &Decision) -> Option<String> {
     let leader = &fitted.candidates[decision.leader()?];
     let (score, k) = (&decision.score, &fitted.problem.constants);
-    let why = if fitted.unknown_probability > leader.probability {
+    let why = if fitted.open_set_probability > leader.probability {
         "a smooth departure without a known cause fits the table better".to_string()
     } else if score.survival(k, leader.effects.len(), fitted.lead(leader)) < 0.5 {
         let percent = 100.0 * score.pooled.max(0.0);

@@ -1,7 +1,8 @@
 //! Parameter intervals by profile likelihood, with their shape. docs/diagnosis/model.md, section 10.
 
-use crate::regression::Basis;
-use crate::regression::{Covariance, Layout, Member, NUISANCES, Posterior, Problem, bounded_step, equations};
+use crate::regression::{
+    Basis, Covariance, Layout, Member, NUISANCES, Posterior, Problem, bounded_step, equations,
+};
 use effects::Parameter;
 use nalgebra::DVector;
 use serde::Serialize;
@@ -10,7 +11,7 @@ use std::ops::Range;
 /// Shape of a profile.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, schemars::JsonSchema)]
 #[serde(rename_all = "snake_case")]
-pub enum Shape {
+pub enum ProfileShape {
     /// Both ends are inside the parameter's range.
     Bounded,
     /// One end only.
@@ -33,7 +34,7 @@ pub struct Estimate {
     /// Unit.
     pub unit: &'static str,
     /// Shape of the interval.
-    pub shape: Shape,
+    pub shape: ProfileShape,
 }
 
 /// Fall of twice the log posterior that bounds a 95 % interval: that quantile of chi2 with one degree of freedom.
@@ -51,10 +52,10 @@ pub fn estimates(problem: &Problem, best: &Posterior, basis: &Basis) -> Vec<Vec<
         let bounds = p.coordinate_bounds();
         let [low, high] = [-1.0, 1.0].map(|side| profiles.end(floor, k, side, bounds));
         let shape = match (low, high) {
-            _ if assumed(problem, best, &precision, k) => Shape::Prior,
-            (Some(_), Some(_)) => Shape::Bounded,
-            (None, None) => Shape::Flat,
-            _ => Shape::OneSided,
+            _ if assumed(problem, best, &precision, k) => ProfileShape::Prior,
+            (Some(_), Some(_)) => ProfileShape::Bounded,
+            (None, None) => ProfileShape::Flat,
+            _ => ProfileShape::OneSided,
         };
         let at = |end: Option<f64>, bound: f64| p.value(end.filter(|u| !u.is_nan()).unwrap_or(bound));
         let ci95 = [at(low, bounds.0), at(high, bounds.1)];
@@ -82,9 +83,9 @@ pub fn curvature(problem: &Problem, e: &Posterior) -> Vec<Estimate> {
                 ci95: [p.value((u - reach).max(low)), p.value((u + reach).min(high))],
                 unit: p.unit,
                 shape: match u - reach < low || u + reach > high {
-                    _ if assumed(problem, e, &precision, at) => Shape::Prior,
-                    true => Shape::OneSided,
-                    false => Shape::Bounded,
+                    _ if assumed(problem, e, &precision, at) => ProfileShape::Prior,
+                    true => ProfileShape::OneSided,
+                    false => ProfileShape::Bounded,
                 },
             }
         })

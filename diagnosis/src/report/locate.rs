@@ -7,8 +7,7 @@ use crate::hypotheses::Fitted;
 use crate::report::predict::{Forecast, Model, forecast};
 use crate::verdict::Decision;
 use effects::Location;
-use models::covariate;
-use models::{Condition, PeakToPeak};
+use models::{Condition, PeakToPeak, covariate};
 use partition::{cuts, levels, named_parts, parts};
 use serde::Serialize;
 use statrs::distribution::{ChiSquared, ContinuousCDF};
@@ -16,7 +15,7 @@ use std::collections::BTreeMap;
 
 /// A box of the operating space with its share of the gap.
 #[derive(Debug, Clone, PartialEq, Serialize, schemars::JsonSchema)]
-pub struct Region {
+pub struct GapRegion {
     /// Bounds of the covariates that are bounded.
     pub bounds: BTreeMap<&'static str, [f64; 2]>,
     /// Share of the gap's square inside, by the model, over the operating space of the design.
@@ -34,7 +33,7 @@ pub struct Region {
 pub fn ledger(fitted: &Fitted, decision: &Decision) -> BTreeMap<&'static str, f64> {
     let mut map: BTreeMap<&'static str, f64> =
         Location::ALL.iter().map(|place| (place.name(), 0.0)).collect();
-    map.insert("unknown", decision.unknown);
+    map.insert("unknown", decision.open_set);
     for (members, p) in decision.stated(fitted) {
         for &e in members {
             *map.entry(effects::at(e).place.name()).or_insert(0.0) += p / members.len() as f64;
@@ -58,7 +57,7 @@ const LEAST_PASSES: f64 = 3.0;
 /// fitted to the passes alone would end where the next pass happens to be. A condition counts by its
 /// probability of standing out. The space is cut into parts, each time where that probability differs most.
 /// The named parts are those that together have the largest expected F1.
-pub fn regions(fitted: &Fitted, rig: &RigFile, model: &Model) -> Vec<Region> {
+pub fn regions(fitted: &Fitted, rig: &RigFile, model: &Model) -> Vec<GapRegion> {
     let problem = &fitted.problem;
     let n = problem.len();
     let mut places = problem.passes.clone();
@@ -76,11 +75,11 @@ pub fn regions(fitted: &Fitted, rig: &RigFile, model: &Model) -> Vec<Region> {
         .collect();
     let total: f64 = weight.iter().sum();
     let residual: Vec<f64> = (0..n)
-        .map(|i| (problem.lateral[i] - fitted.none.prediction[i]).powi(2) / problem.whole_variance(i))
+        .map(|i| (problem.lateral[i] - fitted.baseline.prediction[i]).powi(2) / problem.whole_variance(i))
         .collect();
     let cuts = cuts(&problem.passes, &places);
     let tries: f64 = cuts.iter().map(|c| 2.0 * c.at.len() as f64).sum::<f64>().max(1.0);
-    let mut found: Vec<Region> = named_parts(&parts(&cuts, &chance), &chance)
+    let mut found: Vec<GapRegion> = named_parts(&parts(&cuts, &chance), &chance)
         .into_iter()
         .map(|part| {
             let inside: Vec<usize> = part.members.iter().copied().filter(|&i| i < n).collect();
@@ -110,7 +109,7 @@ fn region(
     passes: &[Condition],
     share: f64,
     p_value: Option<f64>,
-) -> Region {
+) -> GapRegion {
     let mut named = BTreeMap::new();
     let mut words = Vec::new();
     for (k, b) in bounds {
@@ -152,7 +151,7 @@ fn region(
         Some(p) => format!("{percent:.0} % of the gap: {place} (p = {p:.2})"),
     };
     let (p_value, measured) = (p_value.unwrap_or(1.0), p_value.is_some());
-    Region { bounds: named, share_of_gap: share, p_value, text, measured }
+    GapRegion { bounds: named, share_of_gap: share, p_value, text, measured }
 }
 
 /// A bound with two significant digits and all digits before its point; with a third one where two could

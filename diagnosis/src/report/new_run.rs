@@ -94,18 +94,12 @@ fn runs(table: &Table) -> Vec<Vec<usize>> {
 }
 
 /// How far the passes left out lie from their prediction; none where too few are left, or out.
-fn misses(
-    fitted: &Fitted,
-    table: &Table,
-    rig: &RigFile,
-    answer: &Predictor,
-    out: &[usize],
-) -> Option<Misses> {
+fn misses(fitted: &Fitted, table: &Table, rig: &RigFile, by: &Predictor, out: &[usize]) -> Option<Misses> {
     let rest: Vec<usize> = (0..table.len()).filter(|i| out.binary_search(i).is_err()).collect();
     if rest.len() < LEAST[0] || out.len() < LEAST[1] {
         return None;
     }
-    let fit = model(fitted, table, answer, Some(&rest));
+    let fit = model(fitted, table, by, Some(&rest));
     let passes: Vec<_> = out.iter().map(|&i| table.passes[i]).collect();
     let forecasts = forecast(fitted, rig, &fit, &passes);
     // The deviation that holds most of the errors, in units of these forecasts; nothing without any.

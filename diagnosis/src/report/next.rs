@@ -15,8 +15,7 @@ use crate::data::{RigFile, Table};
 use crate::hypotheses::Fitted;
 use crate::report::format::plain;
 use crate::verdict::{Decision, Verdict};
-use models::covariate;
-use models::{Condition, SpringSlider};
+use models::{Condition, SpringSlider, covariate};
 use predictive::predictives;
 use serde::{Serialize, Serializer};
 use std::collections::BTreeMap;
@@ -58,16 +57,10 @@ pub const PASSES: usize = 12;
 const SEEN: f64 = 2.0;
 
 impl Experiment {
-    fn of(
-        conditions: Vec<Condition>,
-        separates: [String; 2],
-        nats: f64,
-        text: String,
-        k: &Constants,
-    ) -> Self {
-        let known = separates.iter().all(|name| name != UNKNOWN);
+    fn of(conditions: Vec<Condition>, between: [String; 2], nats: f64, text: String, k: &Constants) -> Self {
+        let known = between.iter().all(|name| name != UNKNOWN);
         let expected_odds = known.then(|| (nats / k.temper).exp().min(1.0 / k.doubt));
-        Experiment { conditions, separates, expected_nats: nats, expected_odds, text }
+        Experiment { conditions, separates: between, expected_nats: nats, expected_odds, text }
     }
 
     /// What is expected of it, a sentence.
@@ -86,7 +79,7 @@ impl Experiment {
 /// Designs experiments for what a decision left open.
 pub fn experiments(fitted: &Fitted, table: &Table, rig: &RigFile, decision: &Decision) -> Vec<Experiment> {
     let k = &fitted.problem.constants;
-    if decision.verdict == Verdict::NoGap && decision.none >= k.settled_probability {
+    if decision.verdict == Verdict::NoGap && decision.no_gap >= k.settled_probability {
         return Vec::new();
     }
     let mut list: Vec<Experiment> = designed(fitted, table, rig, decision).into_iter().collect();
@@ -119,7 +112,7 @@ fn designed(fitted: &Fitted, table: &Table, rig: &RigFile, decision: &Decision) 
     let hypotheses = predictives(fitted, rig, decision, &grid);
     // Where the evidence is for an effect and the left-out regions are against it, passes that part hypotheses come back to
     // a few conditions and leave the regions as empty as they are. Every second one then goes where nothing is known.
-    let empty = decision.unknown > 0.5 && fitted.unknown_probability < 0.5;
+    let empty = decision.open_set > 0.5 && fitted.open_set_probability < 0.5;
     let open = hypotheses.len() - 1;
     let chosen = design::greedy(&hypotheses, PASSES, empty.then_some(open), k.design_pass_nats);
     let rival = design::rival(&hypotheses)?;

@@ -31,7 +31,7 @@ const HALVINGS: u32 = 24;
 pub fn seen_from(fitted: &Fitted) -> Vec<SeenFrom> {
     let k = &fitted.problem.constants;
     let singles: Vec<&Candidate> = fitted.candidates.iter().filter(|c| c.effects.len() == 1).collect();
-    let prior = (k.prior_null * singles.len() as f64 / k.prior_single).ln();
+    let prior = (k.prior_no_gap * singles.len() as f64 / k.prior_single).ln();
     let threshold = k.temper * (prior + ((1.0 - k.claim_probability) / k.claim_probability).ln());
     let mut list: Vec<SeenFrom> = singles.into_iter().map(|c| one(fitted, c, threshold)).collect();
     let gap = |s: &SeenFrom| s.gap_rmse.unwrap_or(f64::INFINITY);
@@ -41,7 +41,7 @@ pub fn seen_from(fitted: &Fitted) -> Vec<SeenFrom> {
 
 /// By the law that fits best, else by the first that shows: the shapes of a law that fits nothing may be such that it does nothing.
 fn one(fitted: &Fitted, candidate: &Candidate, threshold: f64) -> SeenFrom {
-    let behind = (fitted.none.log_evidence - candidate.log_evidence).max(0.0);
+    let behind = (fitted.baseline.log_evidence - candidate.log_evidence).max(0.0);
     let own = by_law(fitted, &candidate.best, threshold + behind);
     let mut others = candidate.laws.iter().map(|(_, law)| by_law(fitted, law, threshold + behind));
     if own.size.is_some() { own } else { others.find(|s| s.size.is_some()).unwrap_or(own) }

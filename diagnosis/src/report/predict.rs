@@ -93,7 +93,7 @@ impl std::fmt::Display for Predictor {
 }
 
 fn averaged(fitted: &Fitted) -> Vec<(f64, Which)> {
-    let none = fitted.none.log_evidence;
+    let none = fitted.baseline.log_evidence;
     let causes = fitted.candidates.iter().enumerate();
     let shapes = fitted.shapes.iter().enumerate();
     let mut all: Vec<(f64, Which)> = causes
@@ -141,9 +141,9 @@ pub fn model(fitted: &Fitted, table: &Table, answer: &Predictor, rows: Option<&[
     let problem = fitted.problem.select(rows);
     let basis = fitted.basis.select(rows);
     let baseline = if whole {
-        fitted.none.clone()
+        fitted.baseline.clone()
     } else {
-        let fit = minimise(&problem, &[], &fitted.none.u, &problem.variance, ROUNDS[0]);
+        let fit = minimise(&problem, &[], &fitted.baseline.u, &problem.variance, ROUNDS[0]);
         laplace(&problem, &[], &fit.u, &basis, Freedom::NONE, ROUNDS[1])
     };
     let refit = |e: &Posterior| {

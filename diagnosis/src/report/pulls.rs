@@ -6,8 +6,7 @@
 //! stiffness had to move away from its own calibration. The pull says how far: the shift in units of the
 //! deviation that such a shift has when prior and table agree (prior variance less posterior variance).
 
-use crate::regression::Posterior;
-use crate::regression::{Member, Problem};
+use crate::regression::{Member, Posterior, Problem};
 use effects::{Law, Location, library};
 use serde::Serialize;
 

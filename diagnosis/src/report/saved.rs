@@ -1,7 +1,6 @@
 //! The corrected model of a verdict, for the rig to run with.
 
-use crate::regression::Posterior;
-use crate::regression::{Layout, Member, Problem};
+use crate::regression::{Layout, Member, Posterior, Problem};
 use crate::report::Diagnosis;
 use crate::verdict::Verdict;
 use effects::Location;
@@ -19,7 +18,7 @@ impl Diagnosis {
         let problem = &self.fitted.problem;
         let best = match self.decision.verdict {
             Verdict::Unknown => return None,
-            Verdict::NoGap => &self.fitted.none,
+            Verdict::NoGap => &self.fitted.baseline,
             Verdict::Named | Verdict::Ambiguous => {
                 self.fitted.candidates[self.decision.class[0]].best.by_law()
             }

@@ -4,8 +4,7 @@ use crate::data::{RigFile, Table};
 use crate::hypotheses::Fitted;
 use crate::random::{deviate, split_mix};
 use crate::report::predict::{Predictor, forecast, model};
-use models::Condition;
-use models::covariate;
+use models::{Condition, covariate};
 use rayon::prelude::*;
 use serde::Serialize;
 

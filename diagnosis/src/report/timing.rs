@@ -11,7 +11,7 @@ mod response;
 #[cfg(test)]
 mod tests;
 
-use fit::{Problem, ResponseFit};
+use fit::{ResponseFit, TimingRegression};
 use models::{Condition, FrictionModel};
 use response::Prepared;
 pub use response::{ResponseForm, mean_delay_s};
@@ -60,7 +60,7 @@ pub struct Edge {
 
 /// What the edges of one kind say.
 #[derive(Debug, Clone, PartialEq, Serialize, schemars::JsonSchema)]
-pub struct Comparison {
+pub struct TimingComparison {
     /// What the lateral force is compared with.
     pub against: Against,
     /// Edges that it rests on.
@@ -108,7 +108,7 @@ pub struct RecordPart {
     /// lateness is found.
     pub stated_passband_hz: Option<f64>,
     /// Against the amplitude, then against the position.
-    pub comparisons: Vec<Comparison>,
+    pub comparisons: Vec<TimingComparison>,
 }
 
 impl RecordPart {
@@ -133,7 +133,7 @@ pub fn judge(edges: &[Edge], law: &dyn FrictionModel, stated_passband_hz: Option
     RecordPart { stated_passband_hz, comparisons: [Against::Amplitude, Against::Position].map(one).to_vec() }
 }
 
-fn none(against: Against, all: usize, visible: usize) -> Comparison {
+fn none(against: Against, all: usize, visible: usize) -> TimingComparison {
     let what = match against {
         Against::Amplitude => "steps of the amplitude while the finger slides",
         Against::Position => "turns of the stage under load",
@@ -143,7 +143,7 @@ fn none(against: Against, all: usize, visible: usize) -> Comparison {
         _ => format!("{visible} of {all} {what} show a change of friction; at least {FEWEST} are needed"),
     };
     let text = format!("{}: not judged. {because}", title(against));
-    Comparison {
+    TimingComparison {
         against,
         edges: visible,
         late_s: None,
@@ -165,8 +165,8 @@ pub fn title(against: Against) -> &'static str {
     }
 }
 
-fn compared(against: Against, edges: &[Prepared], stated_s: f64) -> Comparison {
-    let problem = Problem { edges, stated_s };
+fn compared(against: Against, edges: &[Prepared], stated_s: f64) -> TimingComparison {
+    let problem = TimingRegression { edges, stated_s };
     let fits = ResponseForm::ALL.map(|form| (form, problem.fit(form, false)));
     let best = fits.iter().min_by(|a, b| a.1.squares.total_cmp(&b.1.squares)).expect("three forms");
     let variance = best.1.squares / problem.freedom();
@@ -204,7 +204,7 @@ fn compared(against: Against, edges: &[Prepared], stated_s: f64) -> Comparison {
     };
     let ci95_s = [late_s - 1.96 * sd_s, late_s + 1.96 * sd_s];
     let text = text(against, edges.len(), late_s, ci95_s, odds, &causes);
-    Comparison {
+    TimingComparison {
         against,
         edges: edges.len(),
         late_s: Some(late_s),
@@ -252,7 +252,7 @@ fn text(
 }
 
 /// The mean edge in shares of its change, in bins of 2 ms.
-fn mean_edge(problem: &Problem<'_>, form: ResponseForm, fit: &ResponseFit) -> Vec<[f64; 4]> {
+fn mean_edge(problem: &TimingRegression<'_>, form: ResponseForm, fit: &ResponseFit) -> Vec<[f64; 4]> {
     const BIN_S: f64 = 2e-3;
     let expected = problem.fit(ResponseForm::Delay, true);
     let mut bins: std::collections::BTreeMap<i64, [f64; 4]> = std::collections::BTreeMap::new();

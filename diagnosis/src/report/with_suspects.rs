@@ -33,12 +33,12 @@ impl WithSuspects {
 /// The leading effects of a decision and their probability.
 pub(crate) fn leading(fitted: &Fitted, decision: &Decision) -> (Vec<String>, f64) {
     match (decision.verdict, decision.leader()) {
-        (Verdict::NoGap, _) => (Vec::new(), decision.none),
+        (Verdict::NoGap, _) => (Vec::new(), decision.no_gap),
         (Verdict::Named | Verdict::Ambiguous, Some(leader)) => {
             let names = fitted.candidates[leader].names().iter().map(|n| (*n).to_string()).collect();
             (names, decision.probabilities[leader])
         }
-        _ => (vec!["unknown".to_string()], decision.unknown),
+        _ => (vec!["unknown".to_string()], decision.open_set),
     }
 }
 

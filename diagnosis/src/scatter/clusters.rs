@@ -7,8 +7,7 @@
 
 use crate::data::range;
 use crate::random::split_mix;
-use crate::regression::Problem;
-use crate::regression::kernel;
+use crate::regression::{Problem, kernel};
 use models::covariate::{COVARIATES, CovariateRole};
 
 /// Shuffles against which a table is held; fewer for long ones.
@@ -186,8 +185,7 @@ fn levels(values: &[f64], least_spread: f64) -> Option<Vec<usize>> {
     }
     let mut sorted = z.clone();
     sorted.sort_by(f64::total_cmp);
-    let cuts: Vec<f64> =
-        sorted.windows(2).filter(|w| w[1] - w[0] > GAP).map(|w| 0.5 * (w[0] + w[1])).collect();
+    let cuts: Vec<_> = sorted.windows(2).filter(|w| w[1] - w[0] > GAP).map(|w| 0.5 * (w[0] + w[1])).collect();
     if (1..MOST_LEVELS).contains(&cuts.len()) {
         return Some(z.iter().map(|v| cuts.partition_point(|c| c < v)).collect());
     }

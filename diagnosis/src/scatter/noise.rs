@@ -4,8 +4,7 @@ use crate::constants::Constants;
 use crate::data::{RigFile, Table};
 use crate::regression::{Discrepancy, Problem, lengths, minimise};
 use crate::scatter::{self, Belief, Scatter};
-use models::covariate;
-use models::{Condition, PeakToPeak};
+use models::{Condition, PeakToPeak, covariate};
 use serde::Serialize;
 use statrs::distribution::{ChiSquared, ContinuousCDF};
 use std::collections::BTreeMap;
@@ -62,8 +61,7 @@ pub fn settle(
     // The level of friction enters the variance: it is taken from a smooth surface, not from the baseline.
     let stated = |level: &[f64]| variance(problem, rig, &center, level, 1.0);
     let mut scatter = scatter::estimate(table, problem, &center, &stated, belief);
-    let stated: Vec<f64> =
-        stated(&scatter.level).iter().zip(&scatter.inflation).map(|(v, i)| v * i).collect();
+    let stated: Vec<_> = stated(&scatter.level).iter().zip(&scatter.inflation).map(|(v, i)| v * i).collect();
     let pure = replicates(table, problem, &stated, &scatter);
     problem.variance =
         stated.iter().enumerate().map(|(i, v)| v * pure.used + problem.law_variance(i)).collect();

@@ -97,7 +97,7 @@ impl State {
 }
 
 /// A surface at one smoothness: what is to be explained, and the columns that explain it.
-pub struct Surface {
+pub struct ScatterSurface {
     constants: Arc<Constants>,
     linear: Linear,
     lateral: DVector<f64>,
@@ -117,10 +117,10 @@ pub struct Seen {
     pub level: Vec<f64>,
 }
 
-impl Surface {
+impl ScatterSurface {
     /// The surface of one smoothness.
     pub fn new(table: &Table, problem: &Problem, center: &[f64], lengths: Lengths) -> Self {
-        Surface {
+        ScatterSurface {
             constants: problem.constants.clone(),
             linear: Linear::about(table, problem, center, lengths),
             lateral: DVector::from_column_slice(&problem.lateral),

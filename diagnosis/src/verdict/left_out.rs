@@ -32,7 +32,7 @@ impl Errors {
 
 /// A part of the operating space that was left out and predicted from the rest.
 #[derive(Debug, Clone)]
-pub struct Region {
+pub struct LeftOutRegion {
     /// What it is, in words.
     pub name: String,
     /// Errors there.
@@ -105,8 +105,7 @@ pub fn regions(problem: &Problem) -> Vec<LeftOutPart> {
             }
         }
     }
-    let late: Vec<usize> =
-        all.iter().copied().filter(|&i| i as f64 >= (1.0 - k.late_share) * n as f64).collect();
+    let late: Vec<_> = all.iter().copied().filter(|&i| i as f64 >= (1.0 - k.late_share) * n as f64).collect();
     list.push(LeftOutPart { name: "late".to_string(), over: &TIME, rows: late });
     let pressures: Vec<f64> = p.iter().filter_map(|q| q.ambient_pressure_pa).collect();
     if pressures.len() == n {
@@ -205,10 +204,10 @@ fn own_changes(problem: &Problem, best: &Posterior) -> Vec<Vec<f64>> {
 }
 
 /// Predicts each region from the rest, by the hypothesis' form alone.
-pub fn left_out_regions(fitted: &Fitted, best: &Posterior) -> Vec<Region> {
+pub fn left_out_regions(fitted: &Fitted, best: &Posterior) -> Vec<LeftOutRegion> {
     let problem = &fitted.problem;
     let k = &problem.constants;
-    let whole = problem.misfit(&fitted.none.prediction) - problem.len() as f64;
+    let whole = problem.misfit(&fitted.baseline.prediction) - problem.len() as f64;
     let own = own_changes(problem, best);
     regions(problem)
         .into_par_iter()
@@ -224,7 +223,7 @@ pub fn left_out_regions(fitted: &Fitted, best: &Posterior) -> Vec<Region> {
             } else {
                 left_out(&rest, &out, &best.members, &best.u).0
             };
-            let (baseline, refit) = left_out(&rest, &out, &[], &fitted.none.u);
+            let (baseline, refit) = left_out(&rest, &out, &[], &fitted.baseline.u);
             let metric = metric(&rest, &out, &refit);
             let n = out.len();
             let mean = |r: &DVector<f64>| metric.quadratic(r) / n.max(1) as f64;
@@ -234,7 +233,7 @@ pub fn left_out_regions(fitted: &Fitted, best: &Posterior) -> Vec<Region> {
             let informed = shown && gap > k.carrying_sd * scatter && gap > k.informed_share * whole;
             // A function that may be any says nothing of values that it was not seen at.
             let judges = !tells_nothing(problem, &rest, best) && !best.change.bends_over(over);
-            Region { name, errors, informed, judges }
+            LeftOutRegion { name, errors, informed, judges }
         })
         .collect()
 }
@@ -272,7 +271,7 @@ impl RegionScore {
 ///
 /// What is left is granted its sampling error, the root of twice the number of passes in units of the floor:
 /// a small gap cannot be shown to stay open by noise alone.
-pub fn score_of(k: &Constants, regions: &[Region]) -> RegionScore {
+pub fn score_of(k: &Constants, regions: &[LeftOutRegion]) -> RegionScore {
     let share = |gap: f64, left: f64| (gap > 0.0).then(|| 1.0 - (left.max(0.0) / gap).sqrt());
     let (mut gap, mut left, mut passes) = (0.0, 0.0, 0.0);
     let (mut carrying, mut closed) = (0, 0);
@@ -335,7 +334,7 @@ mod tests {
         let mut rig = rig();
         rig.finger.stiffness_relative_sd = 0.3;
         let mut problem = Problem::new(&table, &rig, &Default::default());
-        crate::scatter::noise::settle(&table, &rig, &mut problem, &crate::scatter::Belief::Judged);
+        crate::scatter::noise::settle(&table, &rig, &mut problem, &crate::scatter::Belief::ByResidual);
         let still: Vec<usize> =
             (0..problem.len()).filter(|&i| problem.passes[i].amplitude.metres() == 0.0).collect();
         let nominal = problem.jacobian(&[], &[0.0; 3], &problem.predict(&[], &[0.0; 3]));

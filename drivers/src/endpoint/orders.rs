@@ -286,8 +286,7 @@ fn heartbeat(profile: &Profile, count: u32) -> Option<(SetId, f64)> {
 
 fn safe_set_points(profile: &Profile) -> Vec<(SetId, f64)> {
     let sets = profile.description.set.iter().enumerate();
-    let mut safe: Vec<(SetId, f64)> =
-        sets.filter_map(|(i, set)| set.safe.map(|safe| (SetId(i), safe))).collect();
+    let mut safe: Vec<_> = sets.filter_map(|(i, set)| set.safe.map(|safe| (SetId(i), safe))).collect();
     let place = |(set, _): &(SetId, f64)| {
         let name = profile.description.set[set.0].name.as_ref();
         OFF_FIRST.iter().position(|first| first == name).unwrap_or(OFF_FIRST.len())

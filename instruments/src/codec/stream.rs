@@ -8,7 +8,7 @@ use super::checksum::Check;
 
 /// What a stream's frames look like.
 #[derive(Debug, Clone, PartialEq, Eq)]
-pub struct Shape {
+pub struct FrameShape {
     /// The bytes that every frame begins with; may be empty.
     pub sync: Vec<u8>,
     /// Length of a frame, sync and check included.
@@ -23,7 +23,7 @@ pub struct Shape {
     pub believed_after: u32,
 }
 
-impl Shape {
+impl FrameShape {
     /// What keeps bytes from being such a frame; `None` where they are one.
     pub fn misfit(&self, frame: &[u8]) -> Option<String> {
         let hex = |bytes: &[u8]| bytes.iter().map(|byte| format!("{byte:02x}")).collect::<String>();
@@ -45,7 +45,7 @@ impl Shape {
 /// Cuts a stream of bytes into frames.
 #[derive(Debug, Clone)]
 pub struct Cutter {
-    shape: Shape,
+    shape: FrameShape,
     buffer: Vec<u8>,
     good_in_a_row: u32,
     /// Bytes that belonged to no frame.
@@ -59,7 +59,7 @@ const CHUNK: usize = 2048;
 
 impl Cutter {
     /// For frames of that shape.
-    pub fn new(shape: Shape) -> Self {
+    pub fn new(shape: FrameShape) -> Self {
         Self { shape, buffer: Vec::with_capacity(2 * CHUNK), good_in_a_row: 0, skipped: 0, lost: 0 }
     }
 
@@ -89,7 +89,7 @@ impl Cutter {
 
     fn fits(&self, candidate: &[u8]) -> bool {
         let (body, check) = candidate.split_at(candidate.len() - self.shape.check.length());
-        let Shape { sync, check: kind, check_from, check_high_first, .. } = &self.shape;
+        let FrameShape { sync, check: kind, check_from, check_high_first, .. } = &self.shape;
         candidate.starts_with(sync)
             && body.get(*check_from..).is_some_and(|body| kind.holds(body, check, *check_high_first))
     }
@@ -100,8 +100,8 @@ mod tests {
     use super::*;
     use crate::codec::from_hex;
 
-    fn ft300() -> Shape {
-        Shape {
+    fn ft300() -> FrameShape {
+        FrameShape {
             sync: vec![0x20, 0x4E],
             length: 16,
             check: Check::CRC_16_MODBUS,
@@ -111,7 +111,7 @@ mod tests {
         }
     }
 
-    fn cut(shape: Shape, bytes: &[u8], chunk: usize) -> Vec<Vec<u8>> {
+    fn cut(shape: FrameShape, bytes: &[u8], chunk: usize) -> Vec<Vec<u8>> {
         let (mut cutter, mut frames) = (Cutter::new(shape), Vec::new());
         for piece in bytes.chunks(chunk) {
             cutter.push(piece, |frame| frames.push(frame.to_vec()));
@@ -144,7 +144,7 @@ mod tests {
     /// Without sync bytes a wrong place passes one time in 128: a few frames in a row must agree.
     #[test]
     fn a_stream_without_sync_bytes_is_aligned_by_its_sums() {
-        let shape = Shape {
+        let shape = FrameShape {
             sync: vec![],
             length: 13,
             check: Check::Sum7WithErrorBit,

@@ -1,7 +1,7 @@
 //! What goes over the link: `[[poll]]`, `[stream]`, `[[message]]`, `[[query]]`, `[[init]]`, `[[write]]`.
 
 use crate::codec::checksum::Check;
-use crate::codec::stream::Shape;
+use crate::codec::stream::FrameShape;
 use schemars::JsonSchema;
 use serde::Deserialize;
 use toml::Spanned;
@@ -120,8 +120,8 @@ pub enum CheckOrder {
 
 impl Stream {
     /// What its binary frames look like; `None` for lines of text and for datagrams without a check.
-    pub fn shape(&self) -> Option<Shape> {
-        Some(Shape {
+    pub fn shape(&self) -> Option<FrameShape> {
+        Some(FrameShape {
             sync: self.sync.clone(),
             length: usize::from(self.length?),
             check: self.check?,

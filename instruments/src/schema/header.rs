@@ -22,7 +22,7 @@ pub struct Header {
     /// Manuals and sources of the facts.
     pub provenance: String,
     /// How far the profile was tried.
-    pub verified: Verified,
+    pub verified: ProfileEvidence,
     /// What a user should know before choosing it.
     #[serde(default)]
     pub notes: String,
@@ -63,7 +63,7 @@ pub enum Role {
 /// How far a profile was tried.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Deserialize, JsonSchema)]
 #[serde(rename_all = "kebab-case")]
-pub enum Verified {
+pub enum ProfileEvidence {
     /// Against emulators and independent peers; no hardware was touched.
     EmulatorOnly,
     /// On a bench.

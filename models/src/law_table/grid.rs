@@ -10,7 +10,7 @@ const AGAIN: usize = 16;
 
 /// Nodes of each variable, in the order of [`super::VARIABLES`].
 #[derive(Clone, Debug)]
-pub struct Grid {
+pub struct LawGrid {
     axes: Vec<(&'static Variable, Vec<f64>)>,
 }
 
@@ -29,12 +29,12 @@ pub struct Tabulated {
     pub checks: usize,
 }
 
-impl Grid {
+impl LawGrid {
     /// A grid from `NAME=LOW..HIGH:COUNT`, with `:log` for equal ratios, one word a variable.
     ///
     /// # Errors
     /// The word that is none, with what is needed.
-    pub fn parse<'a>(words: impl IntoIterator<Item = &'a str>) -> Result<Grid, String> {
+    pub fn parse<'a>(words: impl IntoIterator<Item = &'a str>) -> Result<LawGrid, String> {
         let one = |word: &'a str| {
             let parsed = || {
                 let (name, rest) = word.split_once('=')?;
@@ -61,7 +61,7 @@ impl Grid {
     ///
     /// # Errors
     /// A name that is no variable, nodes that do not rise or are out of range, too many nodes.
-    pub fn of(axes: &[(&str, Vec<f64>)]) -> Result<Grid, String> {
+    pub fn of(axes: &[(&str, Vec<f64>)]) -> Result<LawGrid, String> {
         let mut sorted = Vec::new();
         for variable in &super::VARIABLES {
             let mut own = axes.iter().filter(|a| a.0 == variable.name);
@@ -86,7 +86,7 @@ impl Grid {
             let most = super::MOST_ROWS;
             return Err(format!("grid: {size} nodes; one variable at least, and {most} nodes at most"));
         }
-        Ok(Grid { axes: sorted })
+        Ok(LawGrid { axes: sorted })
     }
 
     /// Columns of the conditions.
@@ -139,7 +139,7 @@ impl Grid {
         nodes.chain((0..checks).map(|n| self.between(n))).chain(again).collect()
     }
 
-    /// The table from the answers to [`Grid::conditions`]: mu' and its standard uncertainty of each.
+    /// The table from the answers to [`LawGrid::conditions`]: mu' and its standard uncertainty of each.
     ///
     /// # Errors
     /// Answers that are too few, or that no law table may have: the condition and what is needed.

@@ -1,4 +1,4 @@
-use super::grid::Grid;
+use super::grid::LawGrid;
 use super::*;
 
 const HEAD: &str = "amplitude_pp_m,speed_m_s,mu_relative";
@@ -79,7 +79,7 @@ fn wrong_tables_are_refused_with_line_and_remedy() {
 
 #[test]
 fn a_grid_names_its_places_and_measures_its_error() {
-    let grid = Grid::parse(["speed_m_s=0.01..0.1:5:log", "amplitude_pp_m=1e-6..5e-6:9"]).unwrap();
+    let grid = LawGrid::parse(["speed_m_s=0.01..0.1:5:log", "amplitude_pp_m=1e-6..5e-6:9"]).unwrap();
     assert_eq!(grid.columns(), ["amplitude_pp_m", "speed_m_s"]);
     let f = |w: f64, u: f64| 1.0 - (-0.3 * u / w * 1e-6 / 0.02).exp();
     let answers =
@@ -110,7 +110,7 @@ fn a_grid_names_its_places_and_measures_its_error() {
         (vec!["mu0=0.1..1:2", "mu0=0.1..1:2"], "twice"),
         (vec!["speed_m_s=0..1:2000000"], "nodes"),
     ] {
-        let why = Grid::parse(words.iter().copied()).unwrap_err();
+        let why = LawGrid::parse(words.iter().copied()).unwrap_err();
         assert!(why.contains(part), "{why}");
     }
     let mut wrong = answers(0);
@@ -121,6 +121,6 @@ fn a_grid_names_its_places_and_measures_its_error() {
 /// It listed variables of effects, which a law cannot have.
 #[test]
 fn a_grid_names_the_variables_of_laws() {
-    let why = Grid::parse(["temperature_c=20..30:3"]).unwrap_err();
+    let why = LawGrid::parse(["temperature_c=20..30:3"]).unwrap_err();
     assert!(why.ends_with("there are amplitude_pp_m, frequency_hz, speed_m_s, normal_force_n, mu0"), "{why}");
 }

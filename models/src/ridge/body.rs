@@ -42,7 +42,7 @@ pub(super) struct RowLaw {
 
 /// First geometry of the elements, for small strain.
 #[derive(Clone, Debug, Default)]
-pub(super) struct Shape {
+pub(super) struct ElementGeometry {
     pub dx13: Field,
     pub dy13: Field,
     pub dx24: Field,
@@ -131,7 +131,7 @@ pub struct Body {
     pub(super) hourglass_y: Field,
     pub(super) hourglass_stiffness: Field,
     pub(super) length: Field,
-    pub(super) shape: Shape,
+    pub(super) shape: ElementGeometry,
     /// Of the viscous arms; empty without any.
     pub(super) arm: Stress,
     pub(super) laws: Vec<RowLaw>,
@@ -194,7 +194,7 @@ impl Body {
             }
         }
         let [dx13, dy13, dx24, dy24, half_over_area, hx, hy] = shape.map(|field| Field::from(&field[..]));
-        let shape = Shape { dx13, dy13, dx24, dy24, half_over_area, hx, hy };
+        let shape = ElementGeometry { dx13, dy13, dx24, dy24, half_over_area, hx, hy };
         let mass = Field::from(&mesh.lumped_mass_kg_m()[..]);
         let inverse: Vec<f64> = mass.iter().map(|m| if *m > 0.0 { 1.0 / m } else { 0.0 }).collect();
         let viscous = mesh.row_material.iter().any(|m| m.arm().is_some());

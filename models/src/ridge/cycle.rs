@@ -7,7 +7,7 @@ pub const BINS: usize = 256;
 
 /// One cycle in bins of equal time; phase zero is the plate's upward passage through its middle.
 #[derive(Clone, Debug, PartialEq, Serialize)]
-pub struct Cycle {
+pub struct RidgeCycle {
     /// Mean normal force in each bin, N per metre of depth.
     pub normal: Vec<f64>,
     /// Mean lateral force in each bin, N per metre of depth.
@@ -18,9 +18,9 @@ pub struct Cycle {
     pub contact_fraction: f64,
 }
 
-impl Default for Cycle {
+impl Default for RidgeCycle {
     fn default() -> Self {
-        Cycle {
+        RidgeCycle {
             normal: vec![0.0; BINS],
             lateral: vec![0.0; BINS],
             skin_velocity: vec![0.0; BINS],
@@ -29,7 +29,7 @@ impl Default for Cycle {
     }
 }
 
-impl Cycle {
+impl RidgeCycle {
     /// Mean normal force, N per metre.
     pub fn mean_normal(&self) -> f64 {
         mean(&self.normal)
@@ -41,8 +41,8 @@ impl Cycle {
     }
 
     /// The mean of several cycles, bin by bin.
-    pub fn average(cycles: &[Cycle]) -> Cycle {
-        let mut sum = Cycle::default();
+    pub fn average(cycles: &[RidgeCycle]) -> RidgeCycle {
+        let mut sum = RidgeCycle::default();
         let share = 1.0 / cycles.len() as f64;
         for cycle in cycles {
             for (field, values) in [
@@ -135,7 +135,7 @@ impl Steady {
 
 /// Whether the contact repeats every second cycle and not every cycle: the change of the reaction force
 /// over two cycles is far smaller than over one, which is not small itself.
-pub fn period_doubled(cycles: &[Cycle]) -> bool {
+pub fn period_doubled(cycles: &[RidgeCycle]) -> bool {
     let distance = |lag: usize| {
         let sum: f64 = (lag..cycles.len())
             .map(|c| {

@@ -7,7 +7,7 @@
 //! slow drift of the soft tissue and nothing else. At the end both agree, which is checked.
 
 use super::body::{Energy, Work};
-use super::cycle::{self, BINS, Cycle, Steady, mean};
+use super::cycle::{self, BINS, RidgeCycle, Steady, mean};
 use super::{Body, ContactForce, Plate, RidgeCase, RidgeError, stability};
 use crate::psi::PsiEq17;
 use crate::regime::Regime;
@@ -124,10 +124,10 @@ pub struct RidgeRun {
     pub energy: Option<EnergyBalance>,
     /// The mean cycle, forces per metre of depth of the ridge.
     #[serde(skip)]
-    pub mean_cycle: Cycle,
+    pub mean_cycle: RidgeCycle,
     /// All cycles, the ramp first.
     #[serde(skip)]
-    pub history: Vec<Cycle>,
+    pub history: Vec<RidgeCycle>,
 }
 
 struct Rig {
@@ -212,8 +212,8 @@ impl Rig {
     }
 
     /// One cycle of the plate with an amplitude going linearly from `from` to `to` (sine amplitudes, m).
-    fn cycle(&mut self, per_bin: usize, speed: f64, from: f64, to: f64) -> Cycle {
-        let mut cycle = Cycle::default();
+    fn cycle(&mut self, per_bin: usize, speed: f64, from: f64, to: f64) -> RidgeCycle {
+        let mut cycle = RidgeCycle::default();
         let total = (per_bin * BINS) as f64;
         let mut touching = 0_usize;
         for bin in 0..BINS {
@@ -332,7 +332,7 @@ pub fn run_watched(
     };
     let averaged = window.unwrap_or((values.len() / 2).max(1));
     let last = &history[history.len() - averaged..];
-    let mean_cycle = Cycle::average(last);
+    let mean_cycle = RidgeCycle::average(last);
     let energy = settings.energy.then(|| rig.tally().since(&marks[marks.len() - averaged]));
     let scale = case.finger_per_ridge_m();
     let (normal, lateral) = (mean_cycle.mean_normal(), mean_cycle.mean_lateral());

@@ -137,8 +137,7 @@ impl PhaseCurves {
             done();
             Ok(if phase > 270.0 { phase - 360.0 } else { phase })
         };
-        let cases: Vec<(PeakToPeak, Skin)> =
-            amplitudes.iter().flat_map(|w| grid.skins().map(|skin| (*w, skin))).collect();
+        let cases: Vec<_> = amplitudes.iter().flat_map(|w| grid.skins().map(|skin| (*w, skin))).collect();
         let flat: Vec<f64> = cases.into_par_iter().map(phase).collect::<Result<_, RidgeError>>()?;
         let phase_deg = flat.chunks(grid.len()).map(<[f64]>::to_vec).collect();
         let places = [

@@ -1,7 +1,7 @@
 //! The table's text form: axes, hash of the inputs, error, and three fields as integers.
 
 use super::spline::Dense;
-use super::{Axis, Grid, GridPoint, InterpolationError, Surrogate};
+use super::{GridAxis, GridPoint, InterpolationError, Surrogate, SurrogateGrid};
 use std::fmt::Write;
 
 const FIRST_LINE: &str = "muprime ridge table 2";
@@ -44,7 +44,7 @@ impl Surrogate {
     /// # Errors
     /// Results that are missing.
     pub fn table_text(
-        grid: &Grid,
+        grid: &SurrogateGrid,
         result: impl Fn(&GridPoint) -> Option<TableResult>,
         error: InterpolationError,
     ) -> Result<String, TableError> {
@@ -102,8 +102,8 @@ impl Surrogate {
             .strip_prefix("inputs ")
             .ok_or_else(|| bad(n, "'inputs HASH' is needed".into()))?
             .to_string();
-        let mut axes = [Axis { low: 1.0, high: 2.0, count: 2 }; 4];
-        for (axis, (name, _)) in axes.iter_mut().zip(Grid::SHIPPED.axes()) {
+        let mut axes = [GridAxis { low: 1.0, high: 2.0, count: 2 }; 4];
+        for (axis, (name, _)) in axes.iter_mut().zip(SurrogateGrid::SHIPPED.axes()) {
             let (n, line) = next(name)?;
             let words: Vec<&str> = line.split_whitespace().collect();
             let parsed = match words[..] {
@@ -114,7 +114,7 @@ impl Surrogate {
             };
             *axis = match parsed {
                 Some(((low, high), count)) if 0.0 < low && low < high && (2..=1000).contains(&count) => {
-                    Axis { low, high, count }
+                    GridAxis { low, high, count }
                 }
                 _ => return Err(bad(n, format!("'axis {name} LOW HIGH COUNT' is needed, not '{line}'"))),
             };
@@ -134,7 +134,8 @@ impl Surrogate {
             return Err(bad(n, "'error MU_RMS MU_MAX PHASE_RMS_DEG CASES' is needed".into()));
         };
         let [young_modulus_pa, normal_force_n, frequency_hz, speed_over_mu0_m_s] = axes;
-        let grid = Grid { young_modulus_pa, normal_force_n, frequency_hz, speed_over_mu0_m_s, amplitudes };
+        let grid =
+            SurrogateGrid { young_modulus_pa, normal_force_n, frequency_hz, speed_over_mu0_m_s, amplitudes };
         let mut dense = Vec::new();
         for (field, (name, scale)) in FIELDS.into_iter().enumerate() {
             let (n, line) = next(name)?;

@@ -6,7 +6,7 @@ use crate::ridge::{RidgeCase, RunSettings};
 
 /// A logarithmic axis with equal ratios.
 #[derive(Clone, Copy, Debug, PartialEq)]
-pub struct Axis {
+pub struct GridAxis {
     /// Least value.
     pub low: f64,
     /// Greatest value.
@@ -15,7 +15,7 @@ pub struct Axis {
     pub count: usize,
 }
 
-impl Axis {
+impl GridAxis {
     /// Place on the axis: 0 at the low end, 1 at the high end.
     #[inline]
     pub fn place(&self, value: f64) -> f64 {
@@ -35,15 +35,15 @@ impl Axis {
 
 /// The table's axes.
 #[derive(Clone, Copy, Debug, PartialEq)]
-pub struct Grid {
+pub struct SurrogateGrid {
     /// E_sc in Pa.
-    pub young_modulus_pa: Axis,
+    pub young_modulus_pa: GridAxis,
     /// F_n in N.
-    pub normal_force_n: Axis,
+    pub normal_force_n: GridAxis,
     /// f in Hz.
-    pub frequency_hz: Axis,
+    pub frequency_hz: GridAxis,
     /// U/mu_0 in m/s.
-    pub speed_over_mu0_m_s: Axis,
+    pub speed_over_mu0_m_s: GridAxis,
     /// Amplitudes in a column.
     pub amplitudes: usize,
 }
@@ -59,14 +59,14 @@ pub struct GridPoint {
     pub case: RidgeCase,
 }
 
-impl Grid {
+impl SurrogateGrid {
     /// The axes of the shipped table.
-    pub const SHIPPED: Grid = Grid {
+    pub const SHIPPED: SurrogateGrid = SurrogateGrid {
         // From the paper's softest skin to a little beyond its dry finger (202.4 MPa).
-        young_modulus_pa: Axis { low: 20e6, high: 210e6, count: 5 },
-        normal_force_n: Axis { low: 0.1, high: 1.0, count: 3 },
-        frequency_hz: Axis { low: 10e3, high: 100e3, count: 5 },
-        speed_over_mu0_m_s: Axis { low: 0.0025, high: 1.0, count: 6 },
+        young_modulus_pa: GridAxis { low: 20e6, high: 210e6, count: 5 },
+        normal_force_n: GridAxis { low: 0.1, high: 1.0, count: 3 },
+        frequency_hz: GridAxis { low: 10e3, high: 100e3, count: 5 },
+        speed_over_mu0_m_s: GridAxis { low: 0.0025, high: 1.0, count: 6 },
         amplitudes: 9,
     };
 
@@ -105,7 +105,7 @@ impl Grid {
     }
 
     /// The logarithmic axes by name.
-    pub fn axes(&self) -> [(&'static str, Axis); 4] {
+    pub fn axes(&self) -> [(&'static str, GridAxis); 4] {
         [
             ("young_modulus_pa", self.young_modulus_pa),
             ("normal_force_n", self.normal_force_n),

@@ -4,7 +4,7 @@
 use super::*;
 use crate::cycle::Command;
 use crate::ports::{AmplifierState, Contacts, Forces, NoData, SafetyContact, StageState, SupplyState};
-use crate::safety::{Decision, DriveCommand, StageCommand};
+use crate::safety::{DriveCommand, SafetyDecision, StageCommand};
 
 /// A rig of which only the switch and the contacts are there.
 struct Rig;
@@ -77,14 +77,14 @@ fn a_row_is_what_the_cycle_said() {
     };
     let inputs = Inputs { commands: [Some(Command::Reset), None, None, None], seen };
     for (supply, cut) in [(SupplyCommand::Cut, true), (SupplyCommand::Restore, false)] {
-        let decision = Decision {
+        let decision = SafetyDecision {
             drive: DriveCommand::off(1, Nanos(50)),
             stage: StageCommand::stop(1, Nanos(50)),
             supply,
             tripped: None,
             armed_now: false,
-            blocking: Some(Cause::Stopped),
-            waits_for: Some(Cause::EmergencyStop),
+            blocking: Some(TripCause::Stopped),
+            waits_for: Some(TripCause::EmergencyStop),
             lateral_usable: !cut,
             normal_usable: !cut,
             remark: Some(Remark::AmplitudeSags),

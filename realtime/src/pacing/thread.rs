@@ -46,13 +46,13 @@ pub struct LoopParts {
 }
 
 #[derive(Clone, Copy, Debug)]
-struct Grid {
+struct DeadlineGrid {
     period: u64,
     /// The deadline that is due next.
     due: u64,
 }
 
-impl Grid {
+impl DeadlineGrid {
     /// The first deadline of the grid that is not past: where the next cycle begins.
     const fn next(&self, now: u64) -> u64 {
         let past = now.saturating_sub(self.due);
@@ -95,7 +95,7 @@ pub fn run(parts: LoopParts, pacing: Pacing) -> LoopReport {
     let (mut cycles, mut overruns, mut ring_drops, mut watch_drops) = (0u64, 0u64, 0u64, 0u64);
     let mut faults_at_start = (0, 0);
     let mut panicked = None;
-    let mut grid = Grid { period, due: now_ns() + period };
+    let mut grid = DeadlineGrid { period, due: now_ns() + period };
     loop {
         let due = grid.next(now_ns());
         match &held {

@@ -7,7 +7,7 @@ use chunk::Message;
 use mcap::records::{ChunkHeader, op};
 use std::collections::{BTreeMap, VecDeque};
 use std::io::{Cursor, Read, Seek, SeekFrom};
-use verify::{Verified, known, may_begin, verify};
+use verify::{Checked, known, may_begin, verify};
 
 mod chunk;
 mod verify;
@@ -175,7 +175,7 @@ impl<R: Read + Seek> Reader<R> {
     }
 
     /// Reads the record of the format that begins at `at`, where the file is read now; `None` at the end of the file.
-    fn record(&mut self, at: u64) -> Result<Option<(Verified, [u8; HEAD])>, Trouble> {
+    fn record(&mut self, at: u64) -> Result<Option<(Checked, [u8; HEAD])>, Trouble> {
         let size = self.size(at)?;
         let Some((opcode, length, head)) = self.head()? else { return Ok(None) };
         if !known(opcode) {
@@ -188,7 +188,7 @@ impl<R: Read + Seek> Reader<R> {
             return Err(Trouble::Short);
         }
         if self.is_outside(opcode) {
-            return Ok(Some((Verified::Nothing, head)));
+            return Ok(Some((Checked::Nothing, head)));
         }
         let sound = verify(opcode, &self.body, self.wanted).map_err(Trouble::Bad);
         if sound.is_err() {
@@ -307,20 +307,20 @@ impl<R: Read + Seek> Reader<R> {
             }
         };
         self.at += (HEAD + self.body.len()) as u64;
-        if !matches!(sound, Verified::DataEnd(_))
+        if !matches!(sound, Checked::DataEnd(_))
             && let Some(checksum) = &mut self.checksum
         {
             checksum.update(&head);
             checksum.update(&self.body);
         }
         match sound {
-            Verified::Nothing => {}
-            Verified::Chunk(messages) => self.messages = messages,
-            Verified::Entry(entry) => {
+            Checked::Nothing => {}
+            Checked::Chunk(messages) => self.messages = messages,
+            Checked::Entry(entry) => {
                 self.heard(&entry);
                 return Some(entry);
             }
-            Verified::DataEnd(stated) => {
+            Checked::DataEnd(stated) => {
                 let found = self.checksum.replace(crc32fast::Hasher::new()).map(|c| c.finalize());
                 if found.is_some_and(|found| found != stated) {
                     // Every chunk, attachment and fact has been checked by its own checksum: what is damaged lies between.

@@ -88,15 +88,9 @@ impl<W: Write> Sink<W> {
     }
 
     /// A message of the `kind`-th topic.
-    pub fn message(
-        &mut self,
-        kind: usize,
-        sequence: u32,
-        log_time: u64,
-        text: &[u8],
-    ) -> Result<(), McapError> {
-        let header =
-            MessageHeader { channel_id: kind as u16 + 1, sequence, log_time, publish_time: log_time };
+    pub fn message(&mut self, kind: usize, sequence: u32, at_ns: u64, text: &[u8]) -> Result<(), McapError> {
+        let channel_id = kind as u16 + 1;
+        let header = MessageHeader { channel_id, sequence, log_time: at_ns, publish_time: at_ns };
         let chunk = match &mut self.chunk {
             Some(chunk) => chunk,
             none => none.insert(open_chunk()?),

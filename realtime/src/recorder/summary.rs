@@ -148,7 +148,7 @@ impl Walk {
 }
 
 /// What is written of the summary, with its checksum and where its groups are.
-struct Summary<'a, F> {
+struct SummarySection<'a, F> {
     file: &'a mut F,
     start: u64,
     at: u64,
@@ -156,7 +156,7 @@ struct Summary<'a, F> {
     offsets: Vec<u8>,
 }
 
-impl<F: Read + Write + Seek> Summary<'_, F> {
+impl<F: Read + Write + Seek> SummarySection<'_, F> {
     fn write(&mut self, bytes: &[u8]) -> Result<(), McapError> {
         self.file.seek(SeekFrom::Start(self.at))?;
         self.file.write_all(bytes)?;
@@ -189,7 +189,7 @@ pub(super) fn end(file: &mut (impl Read + Write + Seek), data_crc: u32) -> Resul
     file.write_all(&mark)?;
     let start = end + mark.len() as u64;
     let checksum = crc32fast::Hasher::new();
-    let mut summary = Summary { file, start, at: start, checksum, offsets: Vec::new() };
+    let mut summary = SummarySection { file, start, at: start, checksum, offsets: Vec::new() };
     let (mut schemas, mut channels) = (Vec::new(), Vec::new());
     for (kind, topic) in TOPICS.into_iter().enumerate() {
         let id = kind as u16 + 1;
@@ -228,7 +228,7 @@ pub(super) fn end(file: &mut (impl Read + Write + Seek), data_crc: u32) -> Resul
     footer(summary)
 }
 
-fn footer<F: Read + Write + Seek>(mut summary: Summary<'_, F>) -> Result<(), McapError> {
+fn footer<F: Read + Write + Seek>(mut summary: SummarySection<'_, F>) -> Result<(), McapError> {
     let offsets_start = summary.at;
     let offsets = std::mem::take(&mut summary.offsets);
     summary.write(&offsets)?;

@@ -4,9 +4,9 @@
 //! comes in a later cycle. A fitted second channel is opened and closed before every arming, and its own
 //! readback must show both.
 
-use super::cause::{Cause, Unit};
+use super::cause::{TripCause, Unit};
 use super::rules::Breach;
-use super::{Decision, Safety, State, Trip};
+use super::{Safety, SafetyDecision, State, Trip};
 use crate::signals::{Nanos, NoData, SupplyCommand, SupplyState};
 
 /// Time within which the second channel must show the commanded state: ten times a contactor's, and a poll.
@@ -38,26 +38,26 @@ pub(super) enum CutFor {
 
 impl CutFor {
     /// What a person must look at before anything is armed again; none where nothing but a link or the machine fell silent.
-    const fn needs_a_person(self) -> Option<Cause> {
+    const fn needs_a_person(self) -> Option<TripCause> {
         match self {
             Self::Hands | Self::Silence => None,
-            Self::Pressed => Some(Cause::EmergencyStop),
-            Self::Refusal => Some(Cause::RefusesOff),
+            Self::Pressed => Some(TripCause::EmergencyStop),
+            Self::Refusal => Some(TripCause::RefusesOff),
         }
     }
 }
 
 /// Causes that a supply cut on purpose brings about by itself.
-const WITH_THE_CUT: &[Cause] = &[
-    Cause::RefusesOff,
-    Cause::AmplifierStale,
-    Cause::AmplifierFault,
-    Cause::AmplifierWatchdog,
-    Cause::AmplitudeSaturated,
-    Cause::OverTemperature,
+const WITH_THE_CUT: &[TripCause] = &[
+    TripCause::RefusesOff,
+    TripCause::AmplifierStale,
+    TripCause::AmplifierFault,
+    TripCause::AmplifierWatchdog,
+    TripCause::AmplitudeSaturated,
+    TripCause::OverTemperature,
 ];
 
-impl Cause {
+impl TripCause {
     /// Whether an amplifier shows this by itself where its supply is open: then it says nothing of the amplifier.
     pub fn may_be_an_open_supply(self) -> bool {
         WITH_THE_CUT[1..].contains(&self)
@@ -86,7 +86,7 @@ impl ArmingStep {
 
 impl Safety {
     /// Causes that do not stand in the way now, because the supply is cut on purpose.
-    pub(super) fn excused(&self, supply: Result<SupplyState, NoData>) -> &'static [Cause] {
+    pub(super) fn excused(&self, supply: Result<SupplyState, NoData>) -> &'static [TripCause] {
         if supply == Err(NoData::NotFitted) {
             return &[];
         }
@@ -101,17 +101,17 @@ impl Safety {
 
     /// What a reset that nobody but a program asks for would have to wait for: what is broken now, save what follows from a
     /// supply that was cut on purpose, and what only a person may put right; and missed deadlines that would trip the rig once armed.
-    pub(super) fn waits_for(&self, step: &ArmingStep) -> Option<Cause> {
+    pub(super) fn waits_for(&self, step: &ArmingStep) -> Option<TripCause> {
         let besides = step.besides_the_cut.map(|breach| breach.cause);
         let fitted = step.supply != Err(NoData::NotFitted);
         match self.state {
             State::Faulted(_) => {
                 // An amplifier without supply has no fault of its own.
                 let open = step.supply.is_ok_and(|s| s.cut);
-                let besides =
-                    besides.map(|c| if open && c.may_be_an_open_supply() { Cause::SupplySwitch } else { c });
+                let besides = besides
+                    .map(|c| if open && c.may_be_an_open_supply() { TripCause::SupplySwitch } else { c });
                 let cut = self.supply_cut.max(step.cuts_the_supply).filter(|_| fitted);
-                let late = step.is_late.then_some(Cause::Overrun);
+                let late = step.is_late.then_some(TripCause::Overrun);
                 besides.or(cut.and_then(CutFor::needs_a_person)).or(late)
             }
             // Closed again, the amplifier is waited for.
@@ -123,7 +123,7 @@ impl Safety {
     }
 
     /// Moves from state to state. Enters what is new into the decision.
-    pub(super) fn advance(&mut self, step: &ArmingStep, decision: &mut Decision) {
+    pub(super) fn advance(&mut self, step: &ArmingStep, decision: &mut SafetyDecision) {
         match self.state {
             State::Armed { .. } => {
                 if let Some(breach) = step.broken {
@@ -142,7 +142,7 @@ impl Safety {
         }
     }
 
-    fn prove(&mut self, step: &ArmingStep, proof: Proof, since: Nanos, decision: &mut Decision) {
+    fn prove(&mut self, step: &ArmingStep, proof: Proof, since: Nanos, decision: &mut SafetyDecision) {
         let now = step.now;
         if let Some(breach) = step.besides_the_cut {
             return self.trip(breach, step, decision);
@@ -158,7 +158,7 @@ impl Safety {
                 let within = if proof == Proof::Closes && closed { RESTART } else { SUPPLY_ACTS };
                 let waited = now.since(since);
                 if waited > within {
-                    let cause = step.broken.filter(|_| closed).map_or(Cause::SupplySwitch, |b| b.cause);
+                    let cause = step.broken.filter(|_| closed).map_or(TripCause::SupplySwitch, |b| b.cause);
                     let (value, bound) = (waited.seconds(), within.seconds());
                     let breach = Breach { cause, value, bound, unit: Unit::Second };
                     self.trip(breach, step, decision);
@@ -167,7 +167,7 @@ impl Safety {
         }
     }
 
-    fn arm(&mut self, now: Nanos, decision: &mut Decision) {
+    fn arm(&mut self, now: Nanos, decision: &mut SafetyDecision) {
         self.state = State::Armed { since: now };
         (self.supply_cut, self.requested) = (None, false);
         self.watch.lateral.forget_losses();
@@ -175,7 +175,7 @@ impl Safety {
         decision.armed_now = true;
     }
 
-    fn trip(&mut self, breach: Breach, step: &ArmingStep, decision: &mut Decision) {
+    fn trip(&mut self, breach: Breach, step: &ArmingStep, decision: &mut SafetyDecision) {
         let Breach { cause, value, bound, unit } = breach;
         // A sum with 0.0 is never -0.0, which a reader would see as a number below zero.
         let trip =

@@ -13,11 +13,11 @@ macro_rules! causes {
         /// Why the rig is, or would be, faulted.
         #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash, Serialize, Deserialize)]
         #[serde(rename_all = "snake_case")]
-        pub enum Cause {
+        pub enum TripCause {
             $(#[doc = $words] $(#[$doc])* $cause,)*
         }
 
-        impl Cause {
+        impl TripCause {
             /// What happened, in words.
             pub const fn words(self) -> &'static str {
                 match self {
@@ -114,8 +114,8 @@ causes! {
     LoadImplausible "the normal force is not the commanded load" => "Check the loading axis and zero the force sensor: the normal force is not the requested load.";
 }
 
-impl Cause {
-    /// The requirement whose rule latches it; none for [`Cause::StartUp`], which is no rule.
+impl TripCause {
+    /// The requirement whose rule latches it; none for [`TripCause::StartUp`], which is no rule.
     pub fn requirement(self) -> Option<&'static str> {
         RULES.iter().find(|rule| rule.cause == self).map(|rule| rule.id)
     }
@@ -197,7 +197,7 @@ impl Unit {
     }
 }
 
-/// What [`Cause::Unguarded`] misses, by its value.
+/// What [`TripCause::Unguarded`] misses, by its value.
 const MISSING: [&str; 6] = [
     "guard",
     "second channel beside an amplifier without watchdog",
@@ -211,7 +211,7 @@ const MISSING: [&str; 6] = [
 impl fmt::Display for Trip {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         write!(f, "{}", self.cause.words())?;
-        if self.cause == Cause::Unguarded {
+        if self.cause == TripCause::Unguarded {
             let missing = MISSING.get(self.value as usize).copied().unwrap_or_default();
             write!(f, ": there is no {missing}")?;
         }

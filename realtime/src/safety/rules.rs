@@ -2,8 +2,8 @@
 //! `cause.rs`, one line in [`RULES`] and one function here.
 
 use super::arming::{CutFor, SUPPLY_ACTS};
-use super::cause::{Cause, Unit};
-use super::watch::{ForceWatch, STAGE_RESPONSE, Watch};
+use super::cause::{TripCause, Unit};
+use super::watch::{ForceWatch, STAGE_RESPONSE, SafetyMemory};
 use super::{Controls, HARD, Limits, Observation, Remark, Request};
 use crate::signals::{AmplifierState, Channel, Nanos, NoData, SafetyContact, SupplyCommand};
 
@@ -13,7 +13,7 @@ pub struct Rule {
     /// Requirement identifier, stable over versions.
     pub id: &'static str,
     /// The cause that it latches.
-    pub cause: Cause,
+    pub cause: TripCause,
     /// The units that value and bound of its trip may be in.
     pub units: &'static [Unit],
     /// What it demands, in one sentence.
@@ -33,7 +33,7 @@ pub(super) struct Context<'a> {
     pub seen: &'a Observation,
     pub request: &'a Request,
     pub controls: Controls,
-    pub watch: &'a Watch,
+    pub watch: &'a SafetyMemory,
     pub armed_since: Option<Nanos>,
     pub now: Nanos,
 }
@@ -41,14 +41,14 @@ pub(super) struct Context<'a> {
 /// A rule that is broken, by what value.
 #[derive(Clone, Copy, Debug)]
 pub(super) struct Breach {
-    pub cause: Cause,
+    pub cause: TripCause,
     pub value: f64,
     pub bound: f64,
     pub unit: Unit,
 }
 
 /// The first broken rule, in the order of [`RULES`], whose cause is not excused.
-pub(super) fn first_broken_but(context: &Context<'_>, excused: &[Cause]) -> Option<Breach> {
+pub(super) fn first_broken_but(context: &Context<'_>, excused: &[TripCause]) -> Option<Breach> {
     RULES.iter().filter(|rule| !excused.contains(&rule.cause)).find_map(|rule| {
         (rule.check)(context).map(|(value, bound, unit)| Breach { cause: rule.cause, value, bound, unit })
     })
@@ -69,7 +69,7 @@ macro_rules! rules {
         /// Every rule, most urgent first.
         pub const RULES: &[Rule] = &[$(Rule {
             id: $id,
-            cause: Cause::$cause,
+            cause: TripCause::$cause,
             units: &[$(Unit::$unit),+],
             text: $text,
             check: rules!(@check $check, $($unit)+),

@@ -102,7 +102,7 @@ impl Bench {
         healthy(self.n, &self.last).amplifier.unwrap()
     }
 
-    fn cycle(&mut self, spoil: impl FnOnce(&mut Observation), controls: Controls) -> Decision {
+    fn cycle(&mut self, spoil: impl FnOnce(&mut Observation), controls: Controls) -> SafetyDecision {
         self.n += 1;
         let mut seen = healthy(self.n, &self.last);
         stage(&mut seen).velocity_m_s = self.velocity_m_s;
@@ -118,7 +118,7 @@ impl Bench {
     }
 
     /// Spoils every cycle from now on; the cause and the number of cycles until the drive is off.
-    fn until_off(&mut self, mut spoil: impl FnMut(&mut Observation)) -> (Cause, u32) {
+    fn until_off(&mut self, mut spoil: impl FnMut(&mut Observation)) -> (TripCause, u32) {
         for cycles in 1..2000 {
             let decision = self.cycle(&mut spoil, Controls::default());
             if let Some(trip) = decision.tripped {
@@ -130,7 +130,7 @@ impl Bench {
     }
 }
 
-fn is_cut(decision: &Decision) -> bool {
+fn is_cut(decision: &SafetyDecision) -> bool {
     decision.supply == SupplyCommand::Cut
 }
 
@@ -161,7 +161,7 @@ fn starts_faulted_and_arms_only_on_an_edge_with_all_clear() {
     let mut bad = healthy(1, &off);
     bad.forces.normal = Err(NoData::NeverRead);
     let decision = safety.step(&limits, &bad, &request, reset, Nanos(T.0));
-    assert!(!decision.armed_now && decision.blocking == Some(Cause::NormalStale));
+    assert!(!decision.armed_now && decision.blocking == Some(TripCause::NormalStale));
     // The cause clears while the button is held: still no edge.
     let decision = safety.step(&limits, &healthy(2, &off), &request, reset, Nanos(2 * T.0));
     assert!(!decision.armed_now && !decision.drive.enable());
@@ -188,7 +188,7 @@ fn a_trip_latches_with_cause_value_bound_and_cycle() {
         seen.forces.normal = Ok(reading(1.6, n, now));
     };
     let (cause, cycles) = bench.until_off(over);
-    assert_eq!((cause, cycles), (Cause::NormalOverforce, 2), "a step is confirmed by its second sample");
+    assert_eq!((cause, cycles), (TripCause::NormalOverforce, 2), "a step is confirmed by its second sample");
     let State::Faulted(trip) = bench.safety.state else { panic!("not faulted") };
     assert_eq!((trip.value, trip.bound, trip.cycle), (1.6, 1.5, u64::from(before) + 2));
     for _ in 0..100 {
@@ -205,44 +205,44 @@ fn each_fault_trips_with_its_own_cause_within_its_bound() {
     let lateral_age = limits().timing.lateral.age_limit().0 / T.0;
     let amplifier_age = limits().timing.amplifier.age_limit().0 / T.0;
     let frozen = u64::from(limits().frozen_after);
-    let cases: &[(Cause, u64, Spoil)] = &[
-        (Cause::LateralInvalid, 4, |s| s.forces.lateral = Err(NoData::Invalid)),
-        (Cause::NormalInvalid, 4, |s| s.forces.normal.as_mut().unwrap().value = f64::NAN),
-        (Cause::LateralSaturated, 2, |s| s.forces.lateral.as_mut().unwrap().quality = Quality::Saturated),
-        (Cause::NormalSaturated, 2, |s| s.forces.normal.as_mut().unwrap().quality = Quality::Saturated),
-        (Cause::LateralFrozen, frozen + 2, |s| s.forces.lateral.as_mut().unwrap().raw = 77),
-        (Cause::NormalFrozen, frozen + 2, |s| s.forces.normal.as_mut().unwrap().raw = 77),
-        (Cause::LateralOverforce, 2, |s| s.forces.lateral.as_mut().unwrap().value = -2.5),
-        (Cause::AmplifierFault, 1, |s| amplifier(s).fault = true),
-        (Cause::AmplifierWatchdog, 1, |s| amplifier(s).watchdog_tripped = true),
-        (Cause::OverAmplitude, 1, |s| amplifier(s).amplitude.as_mut().unwrap().value = 7e-6),
-        (Cause::AmplitudeRunaway, 2, |s| amplifier(s).amplitude.as_mut().unwrap().value = 3.5e-6),
-        (Cause::OverTemperature, 1, |s| amplifier(s).temperature_c = Err(NoData::Invalid)),
-        (Cause::DriveNoResponse, 2, |s| amplifier(s).amplitude.as_mut().unwrap().value = 0.0),
-        (Cause::EchoMismatch, 2, |s| amplifier(s).echoed_frequency_hz = 27_600.0),
-        (Cause::StageFault, 1, |s| s.stage.as_mut().unwrap().fault = true),
-        (Cause::OverTravel, 1, |s| s.stage.as_mut().unwrap().position_m = 0.061),
-        (Cause::StageStale, 1, |s| s.stage = Err(NoData::Disconnected)),
-        (Cause::Overrun, 2, |s| s.lateness = Nanos(2 * T.0)),
-        (Cause::Overrun, 1, |s| s.lateness = Nanos(3 * T.0)),
-        (Cause::AmplitudeSaturated, 2, |s| {
+    let cases: &[(TripCause, u64, Spoil)] = &[
+        (TripCause::LateralInvalid, 4, |s| s.forces.lateral = Err(NoData::Invalid)),
+        (TripCause::NormalInvalid, 4, |s| s.forces.normal.as_mut().unwrap().value = f64::NAN),
+        (TripCause::LateralSaturated, 2, |s| s.forces.lateral.as_mut().unwrap().quality = Quality::Saturated),
+        (TripCause::NormalSaturated, 2, |s| s.forces.normal.as_mut().unwrap().quality = Quality::Saturated),
+        (TripCause::LateralFrozen, frozen + 2, |s| s.forces.lateral.as_mut().unwrap().raw = 77),
+        (TripCause::NormalFrozen, frozen + 2, |s| s.forces.normal.as_mut().unwrap().raw = 77),
+        (TripCause::LateralOverforce, 2, |s| s.forces.lateral.as_mut().unwrap().value = -2.5),
+        (TripCause::AmplifierFault, 1, |s| amplifier(s).fault = true),
+        (TripCause::AmplifierWatchdog, 1, |s| amplifier(s).watchdog_tripped = true),
+        (TripCause::OverAmplitude, 1, |s| amplifier(s).amplitude.as_mut().unwrap().value = 7e-6),
+        (TripCause::AmplitudeRunaway, 2, |s| amplifier(s).amplitude.as_mut().unwrap().value = 3.5e-6),
+        (TripCause::OverTemperature, 1, |s| amplifier(s).temperature_c = Err(NoData::Invalid)),
+        (TripCause::DriveNoResponse, 2, |s| amplifier(s).amplitude.as_mut().unwrap().value = 0.0),
+        (TripCause::EchoMismatch, 2, |s| amplifier(s).echoed_frequency_hz = 27_600.0),
+        (TripCause::StageFault, 1, |s| s.stage.as_mut().unwrap().fault = true),
+        (TripCause::OverTravel, 1, |s| s.stage.as_mut().unwrap().position_m = 0.061),
+        (TripCause::StageStale, 1, |s| s.stage = Err(NoData::Disconnected)),
+        (TripCause::Overrun, 2, |s| s.lateness = Nanos(2 * T.0)),
+        (TripCause::Overrun, 1, |s| s.lateness = Nanos(3 * T.0)),
+        (TripCause::AmplitudeSaturated, 2, |s| {
             amplifier(s).amplitude.as_mut().unwrap().quality = Quality::Saturated;
         }),
-        (Cause::AmplitudeFrozen, 201, |s| amplifier(s).amplitude.as_mut().unwrap().raw = 77),
-        (Cause::LoadImplausible, 2001, |s| s.forces.normal.as_mut().unwrap().value = 0.7),
-        (Cause::Suspended, 1, |s| s.lateness = Nanos(51 * T.0)),
-        (Cause::AmplifierFault, 1, |s| amplifier(s).amplitude.as_mut().unwrap().value = f64::NAN),
-        (Cause::AmplifierFault, 1, |s| amplifier(s).amplitude.as_mut().unwrap().value = -1e-6),
-        (Cause::AmplifierFault, 1, |s| amplifier(s).echoed_frequency_hz = f64::INFINITY),
-        (Cause::AmplifierFault, 1, |s| amplifier(s).echoed_amplitude = PeakToPeak::from_metres(f64::NAN)),
-        (Cause::DriveNoResponse, 2, |s| amplifier(s).amplitude = Err(NoData::Invalid)),
-        (Cause::StageFault, 1, |s| stage(s).position_m = f64::NAN),
-        (Cause::StageFault, 1, |s| stage(s).velocity_m_s = f64::NAN),
-        (Cause::StageStale, 1, |s| stage(s).taken_at.0 += 1_000_000_000),
-        (Cause::AmplifierStale, 1, |s| amplifier(s).taken_at.0 += 1_000_000_000),
-        (Cause::NormalInvalid, 4, |s| normal(s).taken_at.0 += 1_000_000_000),
-        (Cause::StageNotFollowing, 2, |s| stage(s).velocity_m_s = 0.3),
-        (Cause::StageNotFollowing, 320, |s| stage(s).velocity_m_s = 0.0),
+        (TripCause::AmplitudeFrozen, 201, |s| amplifier(s).amplitude.as_mut().unwrap().raw = 77),
+        (TripCause::LoadImplausible, 2001, |s| s.forces.normal.as_mut().unwrap().value = 0.7),
+        (TripCause::Suspended, 1, |s| s.lateness = Nanos(51 * T.0)),
+        (TripCause::AmplifierFault, 1, |s| amplifier(s).amplitude.as_mut().unwrap().value = f64::NAN),
+        (TripCause::AmplifierFault, 1, |s| amplifier(s).amplitude.as_mut().unwrap().value = -1e-6),
+        (TripCause::AmplifierFault, 1, |s| amplifier(s).echoed_frequency_hz = f64::INFINITY),
+        (TripCause::AmplifierFault, 1, |s| amplifier(s).echoed_amplitude = PeakToPeak::from_metres(f64::NAN)),
+        (TripCause::DriveNoResponse, 2, |s| amplifier(s).amplitude = Err(NoData::Invalid)),
+        (TripCause::StageFault, 1, |s| stage(s).position_m = f64::NAN),
+        (TripCause::StageFault, 1, |s| stage(s).velocity_m_s = f64::NAN),
+        (TripCause::StageStale, 1, |s| stage(s).taken_at.0 += 1_000_000_000),
+        (TripCause::AmplifierStale, 1, |s| amplifier(s).taken_at.0 += 1_000_000_000),
+        (TripCause::NormalInvalid, 4, |s| normal(s).taken_at.0 += 1_000_000_000),
+        (TripCause::StageNotFollowing, 2, |s| stage(s).velocity_m_s = 0.3),
+        (TripCause::StageNotFollowing, 320, |s| stage(s).velocity_m_s = 0.0),
     ];
     for (cause, bound, spoil) in cases {
         let mut bench = Bench::armed();
@@ -253,11 +253,11 @@ fn each_fault_trips_with_its_own_cause_within_its_bound() {
     let mut bench = Bench::armed();
     let last = healthy(bench.n, &bench.last);
     let (got, cycles) = bench.until_off(|s| s.forces.lateral = last.forces.lateral);
-    assert_eq!((got, u64::from(cycles)), (Cause::LateralStale, lateral_age + 1));
+    assert_eq!((got, u64::from(cycles)), (TripCause::LateralStale, lateral_age + 1));
     let mut bench = Bench::armed();
     let last = healthy(bench.n, &bench.last);
     let (got, cycles) = bench.until_off(|s| s.amplifier = last.amplifier);
-    assert_eq!((got, u64::from(cycles)), (Cause::AmplifierStale, amplifier_age + 1));
+    assert_eq!((got, u64::from(cycles)), (TripCause::AmplifierStale, amplifier_age + 1));
 }
 
 #[test]
@@ -275,7 +275,7 @@ fn a_single_spike_is_rejected_and_five_in_fifty_cycles_trip() {
             s.forces.lateral.as_mut().unwrap().value *= 100.0;
         }
     });
-    assert_eq!(cause, Cause::Noisy);
+    assert_eq!(cause, TripCause::Noisy);
     assert!(cycles <= 51);
 }
 
@@ -289,7 +289,11 @@ fn an_amplifier_that_refuses_off_is_cut_from_its_supply() {
     // As long as it stays on nothing arms the rig.
     let reset = Controls { reset: true, ..Controls::default() };
     let decision = bench.cycle(|s| amplifier(s).output_on = true, reset);
-    assert!(!decision.armed_now && decision.blocking == Some(Cause::RefusesOff), "{:?}", decision.blocking);
+    assert!(
+        !decision.armed_now && decision.blocking == Some(TripCause::RefusesOff),
+        "{:?}",
+        decision.blocking
+    );
 }
 
 #[test]
@@ -306,7 +310,7 @@ fn a_request_beyond_a_limit_is_a_trip_not_a_smaller_request() {
         let mut bench = Bench::armed();
         spoil(&mut bench.request);
         let decision = bench.cycle(|_| {}, Controls::default());
-        assert_eq!(decision.tripped.unwrap().cause, Cause::RequestRefused);
+        assert_eq!(decision.tripped.unwrap().cause, TripCause::RequestRefused);
         assert!(!decision.drive.enable());
     }
 }
@@ -331,7 +335,7 @@ fn a_force_that_rises_too_fast_trips_and_a_small_spike_does_not() {
         let n = normal(s).sequence - n0;
         normal(s).value = 0.25 + 0.061 * f64::from(n);
     });
-    assert_eq!((cause, cycles), (Cause::ForceRate, 2));
+    assert_eq!((cause, cycles), (TripCause::ForceRate, 2));
     let mut bench = Bench::armed();
     let n0 = bench.n;
     for _ in 0..15 {
@@ -362,7 +366,7 @@ fn an_amplitude_that_rises_too_fast_trips() {
             w += rise_m;
             bench.cycle(|s| amplifier(s).amplitude.as_mut().unwrap().value = w, Controls::default()).tripped
         });
-        assert_eq!(tripped.map(|t| t.cause), trips.then_some(Cause::AmplitudeRate));
+        assert_eq!(tripped.map(|t| t.cause), trips.then_some(TripCause::AmplitudeRate));
     }
 }
 
@@ -396,7 +400,7 @@ fn lost_samples_are_remarked_and_then_trip() {
     };
     assert_eq!(lose(&mut bench, 2, 250), (Some(Remark::LateralLossy), None));
     let (_, cause) = lose(&mut bench, 5, 250);
-    assert_eq!(cause, Some(Cause::LateralLossy));
+    assert_eq!(cause, Some(TripCause::LateralLossy));
 }
 
 #[test]
@@ -410,7 +414,7 @@ fn a_normal_channel_that_loses_most_samples_trips_by_itself() {
         last.taken_at = lateral(s).taken_at;
         *normal(s) = last;
     });
-    assert!(cause == Cause::NormalLossy && cycles <= 200, "{cause:?} after {cycles}");
+    assert!(cause == TripCause::NormalLossy && cycles <= 200, "{cause:?} after {cycles}");
 }
 
 #[test]

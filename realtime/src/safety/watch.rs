@@ -2,7 +2,7 @@
 
 use super::envelope::Envelope;
 use super::exposure::Exposure;
-use super::{ChannelTiming, Controls, Decision, Limits, Observation};
+use super::{ChannelTiming, Controls, Limits, Observation, SafetyDecision};
 use crate::signals::{Channel, Nanos, NoData, Quality, Sample, SupplyCommand};
 
 /// Memory of one force channel.
@@ -164,7 +164,7 @@ const BUCKET_CYCLES: u32 = 100;
 
 /// Everything safety remembers. `Copy`: no heap, no lock.
 #[derive(Clone, Copy, Debug, Default)]
-pub(super) struct Watch {
+pub(super) struct SafetyMemory {
     pub lateral: ForceWatch,
     pub normal: ForceWatch,
     /// Deadlines missed in a row.
@@ -221,9 +221,9 @@ pub(super) const STAGE_RESPONSE: Nanos = Nanos(300_000_000);
 /// Speeds below this are approach and hold: a stage may rest at them, m/s.
 pub(super) const CREEP_M_S: f64 = 1.5e-3;
 
-impl Watch {
+impl SafetyMemory {
     pub(super) fn new() -> Self {
-        Watch {
+        SafetyMemory {
             lateral: ForceWatch::new(),
             normal: ForceWatch::new(),
             off_since: Some(Nanos(0)),
@@ -317,7 +317,7 @@ impl Watch {
         self.amplifier_on = false;
     }
 
-    pub(super) fn commanded(&mut self, decision: &Decision, now: Nanos) {
+    pub(super) fn commanded(&mut self, decision: &SafetyDecision, now: Nanos) {
         let (drive, stage) = (&decision.drive, &decision.stage);
         if decision.supply != self.supply_commanded {
             (self.supply_commanded, self.supply_since) = (decision.supply, now);

@@ -4,6 +4,7 @@
 use super::{Stall, StallReport};
 use crate::pacing::{monotonic_ns, pin_to, sleep_until};
 use crate::ports::Nanos;
+use crate::threads::refused;
 use std::sync::Arc;
 use std::sync::atomic::{AtomicBool, Ordering};
 use std::thread::JoinHandle;
@@ -35,7 +36,7 @@ impl StallMonitor {
         for cpu in 0..cpus {
             let end = Arc::clone(&end);
             let builder = std::thread::Builder::new().name(format!("monitor-{cpu}")).stack_size(64 * 1024);
-            threads.push(builder.spawn(move || watch(cpu, origin_ns, &end))?);
+            threads.push(builder.spawn(move || watch(cpu, origin_ns, &end)).map_err(refused)?);
         }
         Ok(StallMonitor { end, threads })
     }

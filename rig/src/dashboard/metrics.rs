@@ -7,6 +7,7 @@ use crate::live::{Received, State, View, Viewer};
 use axum::extract;
 use axum::http::header;
 use axum::response::{IntoResponse, Response};
+use realtime::threads;
 use runs::Event;
 use runs::job::LATENESS_BOUNDS_S;
 use std::fmt::Write as _;
@@ -74,7 +75,7 @@ fn follow(shared: &Arc<Shared>, name: &str) -> Option<Followed> {
         }
         locked(&shared.followed).remove(&key);
     };
-    std::thread::Builder::new().name("metrics".into()).spawn(take).ok()?;
+    threads::spawn("metrics", take).ok()?;
     followed.insert(name.to_string(), Arc::clone(&view));
     drop(followed);
     // The run so far comes at once, its states last.

@@ -4,6 +4,7 @@ use super::guard::Guard;
 use super::metrics::Followed;
 use super::{Options, api, serve};
 use miette::{IntoDiagnostic, WrapErr};
+use realtime::threads;
 use runs::files::open_plain;
 use std::collections::BTreeMap;
 use std::fs::OpenOptions;
@@ -83,7 +84,7 @@ impl Dashboard {
         });
         let runtime = tokio::runtime::Builder::new_current_thread().enable_all().build().into_diagnostic()?;
         let serves = move || runtime.block_on(serve::serve(listener, api::routes(shared)));
-        std::thread::Builder::new().name("dashboard".into()).spawn(serves).into_diagnostic()?;
+        threads::spawn("dashboard", serves).into_diagnostic()?;
         Ok(Dashboard { address, token })
     }
 

@@ -10,6 +10,7 @@ use axum::extract::ws::{self, WebSocket, WebSocketUpgrade};
 use axum::extract::{Path, State};
 use axum::http::StatusCode;
 use axum::response::{IntoResponse, Response};
+use realtime::threads;
 use std::sync::Arc;
 use std::sync::atomic::Ordering;
 use std::time::Duration;
@@ -79,7 +80,7 @@ where
         let hearing = Arc::clone(&place.0);
         let work = move || source(&hearing, &to);
         // It ends with the channel or the run.
-        if std::thread::Builder::new().name("stream".into()).spawn(work).is_ok() {
+        if threads::spawn("stream", work).is_ok() {
             let mut socket = talk(Arc::clone(&place.0), socket, messages).await;
             let _ = tokio::time::timeout(PATIENCE, socket.send(ws::Message::Close(None))).await;
         }

@@ -1,6 +1,6 @@
 //! What was found, against what a run needs.
 
-use super::{ChannelReport, Found, Inspection, LinkCounts};
+use super::{ChannelReport, Inspection, InstrumentFound, LinkCounts};
 use drivers::OpenError;
 use realtime::ports::{AmplifierState, Contacts, NoData, SafetyContact, Sample, StageState};
 use realtime::safety::RULES;
@@ -67,7 +67,7 @@ const AT_REST_M_S: f64 = 0.5e-3;
 const OFF_AMPLITUDE_PP_M: f64 = 0.3e-6;
 
 /// A problem and what to do about it.
-type Problem = (String, &'static str);
+type Advice = (String, &'static str);
 
 const LINK: &str = "check cable and power, and what else talks on this line";
 const UNIT: &str = "check unit, factor, type and byte order of the signal in its profile, and `gain`";
@@ -96,7 +96,7 @@ pub fn judge(inspected: &Inspection, target: &InspectionScope<'_>) -> Vec<Findin
 
 /// Samples came late or not at all beside stalls of this computer: the fault may be with either.
 fn stalled(inspected: &Inspection) -> Option<Finding> {
-    let late = |found: &Found| {
+    let late = |found: &InstrumentFound| {
         let mut problems = Vec::new();
         found.channels.iter().for_each(|channel| timely(channel, &mut problems));
         found.answers.iter().for_each(|answers| linked(answers, &mut problems));
@@ -115,7 +115,7 @@ fn stalled(inspected: &Inspection) -> Option<Finding> {
     })
 }
 
-fn instrument(found: &Found, inspected: &Inspection, target: &InspectionScope<'_>) -> Finding {
+fn instrument(found: &InstrumentFound, inspected: &Inspection, target: &InspectionScope<'_>) -> Finding {
     let subject = format!("{} `{}` at {}", found.role, found.id, found.address);
     let answers = match &found.answers {
         Ok(answers) => answers,
@@ -130,7 +130,7 @@ fn instrument(found: &Found, inspected: &Inspection, target: &InspectionScope<'_
             return Finding::new(subject, false, problem, advice);
         }
     };
-    let mut problems: Vec<Problem> = Vec::new();
+    let mut problems: Vec<Advice> = Vec::new();
     let mut states = Vec::new();
     // What an amplifier says without its supply is not valid by its own word, and its fault is not its own.
     let unsupplied = found.role == "amplifier" && inspected.supply_is_open();
@@ -187,7 +187,7 @@ fn instrument(found: &Found, inspected: &Inspection, target: &InspectionScope<'_
 }
 
 /// Rate, ages, and whether anything valid came.
-fn timely(c: &ChannelReport, problems: &mut Vec<Problem>) {
+fn timely(c: &ChannelReport, problems: &mut Vec<Advice>) {
     let name = c.name;
     if c.invalid_share > INVALID_SHARE {
         let why = c.missing.map_or("the instrument declared samples invalid".into(), |why| why.to_string());
@@ -216,7 +216,7 @@ fn timely(c: &ChannelReport, problems: &mut Vec<Problem>) {
 }
 
 /// Samples at the ends of the range.
-fn saturated(c: &ChannelReport, problems: &mut Vec<Problem>) {
+fn saturated(c: &ChannelReport, problems: &mut Vec<Advice>) {
     if c.saturated_share > INVALID_SHARE {
         let (name, percent) = (c.name, c.saturated_share * 1e2);
         let problem = format!("{name}: {percent:.0} % of its samples are at the end of its range");
@@ -224,7 +224,7 @@ fn saturated(c: &ChannelReport, problems: &mut Vec<Problem>) {
     }
 }
 
-fn linked(answers: &LinkCounts, problems: &mut Vec<Problem>) {
+fn linked(answers: &LinkCounts, problems: &mut Vec<Advice>) {
     if answers.bad_share > BAD_SHARE {
         problems.push((format!("{:.0} % of its answers are none", answers.bad_share * 1e2), LINK));
     }
@@ -244,7 +244,7 @@ fn linked(answers: &LinkCounts, problems: &mut Vec<Problem>) {
 }
 
 /// Values of an axis of force at rest.
-fn force(c: &ChannelReport, target: &InspectionScope<'_>, problems: &mut Vec<Problem>) {
+fn force(c: &ChannelReport, target: &InspectionScope<'_>, problems: &mut Vec<Advice>) {
     let (limits, name) = (&target.setup.config.limits, c.name);
     let most = if name == "normal" { limits.normal_force_max_n } else { limits.lateral_force_max_n };
     let frozen_after = limits.frozen_after;
@@ -286,7 +286,7 @@ fn stated_noise(setup: &Setup, axis: &str) -> Option<f64> {
     })
 }
 
-fn amplifier(s: AmplifierState, setup: &Setup, supply_is_open: bool, problems: &mut Vec<Problem>) -> String {
+fn amplifier(s: AmplifierState, setup: &Setup, supply_is_open: bool, problems: &mut Vec<Advice>) -> String {
     if s.output_on {
         problems.push(("its output is ON at rest".into(), "find who drives it, and switch it off"));
     }
@@ -310,7 +310,7 @@ fn amplifier(s: AmplifierState, setup: &Setup, supply_is_open: bool, problems: &
     )
 }
 
-fn stage(s: StageState, setup: &Setup, problems: &mut Vec<Problem>) -> String {
+fn stage(s: StageState, setup: &Setup, problems: &mut Vec<Advice>) -> String {
     let (left, right) = setup.config.limits.travel_m;
     if s.fault {
         problems.push(("it reports a FAULT".into(), "read the fault on the stage, and reset it there"));
@@ -325,7 +325,7 @@ fn stage(s: StageState, setup: &Setup, problems: &mut Vec<Problem>) -> String {
     format!("at {}, {}", quantity(s.position_m, "m"), quantity(s.velocity_m_s, "m/s"))
 }
 
-fn contacts(c: &Contacts, states: &mut Vec<String>, problems: &mut Vec<Problem>) {
+fn contacts(c: &Contacts, states: &mut Vec<String>, problems: &mut Vec<Advice>) {
     let mut one = |name: &str, contact: Result<SafetyContact, NoData>, needed: bool| match contact {
         Err(NoData::NotFitted) => {}
         Err(why) => problems.push((format!("{name}: {why}"), LINK)),
@@ -427,7 +427,7 @@ mod tests {
             samples: 1000,
             missing: None,
         };
-        let found = Found {
+        let found = InstrumentFound {
             role: "force",
             id: "muprime-force2".into(),
             address: "127.0.0.1:1".into(),

@@ -225,7 +225,7 @@ fn a_ledger_that_cannot_be_kept_refuses_the_finger_or_stops_the_rig() {
 #[test]
 fn a_restart_of_the_machine_forgets_nothing() {
     let minute = |n: u64| n * MINUTE_NS;
-    let mut entry = Entry { boot: "one".into(), until_ns: minute(100), ..Entry::default() };
+    let mut entry = Account { boot: "one".into(), until_ns: minute(100), ..Account::default() };
     entry.add(90 * SECOND, 1.0, Nanos(60 * SECOND), minute(110));
     let moved = entry.clone().moved_to("two");
     // All of it was before the start; ten minutes later all of it counts, an hour later none.

@@ -2,6 +2,7 @@
 #![allow(clippy::disallowed_methods, reason = "threads beside everything else")]
 
 use super::{Ask, Ended, Message, Progress, Run, State, TimedEvent, View, is_ours, place};
+use realtime::threads;
 use runs::MeasuredPass;
 use runs::job::{Signals, Update};
 use rustix::net::sockopt::socket_peercred;
@@ -123,7 +124,7 @@ impl Feed {
         let teller = Teller { listener, signals, view, viewers, left_behind: 0 };
         let session = tracing::Span::current();
         let tell = move || session.in_scope(|| teller.tell(&messages));
-        let teller = std::thread::Builder::new().name("viewers".into()).spawn(tell)?;
+        let teller = threads::spawn("viewers", tell)?;
         Ok(Open { queue, teller })
     }
 }
@@ -220,7 +221,7 @@ impl Teller {
         let (lines, rest) = sync_channel::<Arc<str>>(VIEWER_QUEUE);
         let (mut to, from) = (stream.try_clone()?, stream.try_clone()?);
         let (done, written) = channel();
-        std::thread::Builder::new().name("viewer".into()).spawn(move || {
+        threads::spawn("viewer", move || {
             let whole = before.into_iter().chain(rest).try_for_each(|line| to.write_all(line.as_bytes()));
             let _ = to.shutdown(std::net::Shutdown::Both);
             // One that has gone away by itself misses nothing.
@@ -230,7 +231,7 @@ impl Teller {
             let _ = done.send(whole.map_or_else(|e| gone(&e), |()| true));
         })?;
         let signals = self.signals.clone();
-        std::thread::Builder::new().name("viewer's word".into()).spawn(move || listen(from, &signals))?;
+        threads::spawn("viewer's word", move || listen(from, &signals))?;
         Ok(Seat { lines, stream, written })
     }
 }

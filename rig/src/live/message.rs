@@ -1,7 +1,7 @@
 //! The messages of a run in progress.
 
 use realtime::ports::Channel;
-use realtime::{Cause, Phase};
+use realtime::{Phase, TripCause};
 use runs::job::{Deadlines, Extremes, Job, Snapshot, unix_ns};
 use runs::setup::Guards;
 use runs::{Event, MeasuredPass, Outcome};
@@ -118,7 +118,7 @@ pub struct State {
     /// The same in standard deviations of the difference.
     pub z: Option<f64>,
     /// What stands in the way of arming; while armed, the first rule that is broken now.
-    pub blocking: Option<Cause>,
+    pub blocking: Option<TripCause>,
     /// Of all cycles since the last state.
     #[serde(default)]
     pub extremes: Extremes,

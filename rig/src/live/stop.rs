@@ -2,8 +2,7 @@
 #![allow(clippy::disallowed_methods, reason = "somebody waits for a run to stop")]
 
 use super::{Ask, Message, Received, Viewer};
-use runs::Event;
-use runs::run_dir;
+use runs::{Event, run_dir};
 use rustix::process::{Pid, Signal, kill_process};
 use std::collections::BTreeSet;
 use std::path::{Path, PathBuf};

@@ -10,8 +10,10 @@ mod drive;
 use super::AtTheBench;
 use crate::rig_lock::RigLock;
 use drive::Drive;
-use drivers::vibrometer::Settings;
+use drivers::vibrometer::VibrometerSettings;
+use miette::IntoDiagnostic;
 use models::PeakToPeak;
+use realtime::threads;
 use runs::job::Unfinished;
 use runs::{Setup, ask, say};
 use std::fmt::Write as _;
@@ -53,7 +55,7 @@ pub fn table(setup: &Setup, table: &LiveTable<'_>) -> miette::Result<String> {
 }
 
 /// The set-points and the questions.
-fn take(table: &LiveTable<'_>, drive: &Drive, settings: &Settings) -> miette::Result<String> {
+fn take(table: &LiveTable<'_>, drive: &Drive, settings: &VibrometerSettings) -> miette::Result<String> {
     drive.arm()?;
     say!(
         "The plate will vibrate at {:.1} Hz, up to {:.2} \u{b5}m peak-to-peak. Nothing may touch it. Each question wants the \
@@ -101,8 +103,7 @@ fn take(table: &LiveTable<'_>, drive: &Drive, settings: &Settings) -> miette::Re
 fn lines_of_stdin() -> miette::Result<Receiver<std::io::Result<String>>> {
     let (into, lines) = sync_channel(1);
     let read = move || std::io::stdin().lock().lines().try_for_each(|line| into.send(line));
-    let spawned = std::thread::Builder::new().name("answers".into()).spawn(read);
-    spawned.map_err(|e| miette::miette!("no thread for the answers: {e}"))?;
+    threads::spawn("answers", read).into_diagnostic()?;
     Ok(lines)
 }
 

@@ -2,6 +2,7 @@
 
 use super::Broker;
 use miette::IntoDiagnostic;
+use realtime::threads;
 use rumqttc::{Client, ConnectionError, Event, LastWill, MqttOptions, Outgoing, QoS};
 use serde_json::Value;
 use std::sync::Arc;
@@ -64,7 +65,7 @@ impl Publisher {
             }
             let _ = end.send(());
         };
-        std::thread::Builder::new().name("mqtt".into()).spawn(connect).into_diagnostic()?;
+        threads::spawn("mqtt", connect).into_diagnostic()?;
         Ok(Publisher { client, prefix: broker.prefix.clone(), given: 0, dropped: 0, shared, ended })
     }
 

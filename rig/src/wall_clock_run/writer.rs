@@ -4,7 +4,7 @@ use super::fault;
 use miette::IntoDiagnostic;
 use realtime::clock::{Clock, Participant};
 use realtime::recorder::{Preamble, Recorder};
-use realtime::{Nanos, Row};
+use realtime::{Nanos, Row, threads};
 use ringbuf::HeapCons;
 use ringbuf::traits::Consumer;
 use runs::files::GuardedFile;
@@ -24,7 +24,7 @@ const SYNC_EVERY: Duration = Duration::from_secs(1);
 const SLACK: Nanos = Nanos(1_000_000_000);
 
 /// Events and passes for the record, with their time.
-pub(super) type Entry = (Nanos, Vec<Event>, Option<MeasuredPass>);
+pub(super) type RecordedNote = (Nanos, Vec<Event>, Option<MeasuredPass>);
 /// The record's last words.
 pub(super) type Last = BTreeMap<String, String>;
 
@@ -39,7 +39,7 @@ pub(super) struct Written {
 
 /// The record's thread, and the channels into it.
 pub(super) struct Recording {
-    pub entries: Sender<Entry>,
+    pub entries: Sender<RecordedNote>,
     last: Sender<Last>,
     thread: JoinHandle<Written>,
 }
@@ -52,13 +52,13 @@ impl Recording {
         rows: HeapCons<Row>,
         lost: &Arc<AtomicBool>,
         clock: &Clock,
-    ) -> miette::Result<Self> {
+    ) -> std::io::Result<Self> {
         let (entries, entries_out) = channel();
         let (last, last_out) = channel();
         let lost = RaisedByPanic(Arc::clone(lost));
         let clock = clock.join(SLACK);
         let write = move || write(file, preamble, rows, &entries_out, &last_out, &lost.0, &clock);
-        let thread = std::thread::Builder::new().name("recorder".into()).spawn(write).into_diagnostic()?;
+        let thread = threads::spawn("recorder", write)?;
         Ok(Recording { entries, last, thread })
     }
 
@@ -87,7 +87,7 @@ fn write(
     file: GuardedFile,
     preamble: Preamble,
     mut rows: impl Consumer<Item = Row>,
-    entries: &Receiver<Entry>,
+    entries: &Receiver<RecordedNote>,
     last: &Receiver<Last>,
     lost: &AtomicBool,
     clock: &Participant,
@@ -112,7 +112,7 @@ fn record(
     file: GuardedFile,
     preamble: Preamble,
     rows: &mut impl Consumer<Item = Row>,
-    entries: &Receiver<Entry>,
+    entries: &Receiver<RecordedNote>,
     last: &Receiver<Last>,
     ended: &mut bool,
     clock: &Participant,
@@ -167,7 +167,7 @@ mod tests {
         let mut options = std::fs::OpenOptions::new();
         let file = GuardedFile::open(&path, options.create_new(true).write(true)).unwrap();
         let (_rows_in, rows) = ringbuf::HeapRb::<Row>::new(8).split();
-        let (_entries_in, entries) = channel::<Entry>();
+        let (_entries_in, entries) = channel::<RecordedNote>();
         let (last_in, last) = channel::<Last>();
         let (done_in, done) = channel();
         std::thread::spawn(move || {

@@ -10,7 +10,7 @@ use calibration::certificate::date;
 use ratatui_core::buffer::Buffer;
 use ratatui_core::layout::Rect;
 use ratatui_core::style::{Color, Style};
-use realtime::Cause;
+use realtime::TripCause;
 use runs::Outcome;
 use runs::report::events::describe;
 
@@ -164,7 +164,7 @@ fn state(page: &Page<'_>) -> (String, Style) {
         return (format!("ENDED: {how}"), style);
     }
     if let Some(trip) = view.trip {
-        if trip.cause == Cause::Stopped {
+        if trip.cause == TripCause::Stopped {
             return ("STOPPED: off, at rest, lifted".into(), look.heading());
         }
         return ("TRIPPED: off, at rest, lifted; latched".into(), look.alarm());
@@ -227,7 +227,7 @@ fn urgent(view: &View) -> Vec<String> {
     let off = view.ended.as_ref().map_or(view.not_off.as_deref(), |ended| ended.off.as_deref());
     lines.extend(off.iter().flat_map(|off| off.lines()).map(plain));
     // A stop on request is nothing to be mended.
-    let trip = view.trip.as_ref().filter(|trip| trip.cause != Cause::Stopped);
+    let trip = view.trip.as_ref().filter(|trip| trip.cause != TripCause::Stopped);
     if let Some(trip) = trip {
         lines.push(format!("STOPPED for safety: {}", plain(&trip.to_string())));
         lines.push(format!("remedy: {}", plain(trip.cause.remedy())));

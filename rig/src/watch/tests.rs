@@ -4,7 +4,7 @@ use models::{Condition, Pass};
 use ratatui_core::buffer::Buffer;
 use ratatui_core::layout::Rect;
 use realtime::compare::PassComparison;
-use realtime::safety::{Cause, Trip, Unit};
+use realtime::safety::{Trip, TripCause, Unit};
 use realtime::{Nanos, Phase};
 use runs::job::Extremes;
 use runs::{Event, MeasuredPass, Outcome};
@@ -97,7 +97,7 @@ fn pass(point: u64, amplitude_um: f64, measured: Option<f64>, predicted: f64) ->
 fn trip() -> Trip {
     let at = Nanos(59_900_000_000);
     Trip {
-        cause: Cause::NormalOverforce,
+        cause: TripCause::NormalOverforce,
         value: f64::INFINITY,
         bound: 2.0,
         unit: Unit::Newton,
@@ -158,7 +158,7 @@ fn states() -> Vec<(&'static str, View)> {
         predicted_sd: None,
         residual: None,
         z: None,
-        blocking: Some(Cause::EmergencyStop),
+        blocking: Some(TripCause::EmergencyStop),
         extremes: Extremes { normal_force_n: Some([f64::NAN, f64::INFINITY]), ..Extremes::default() },
         ..state(1.0)
     })));

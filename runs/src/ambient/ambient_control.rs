@@ -3,12 +3,12 @@
 //! It works beside the loop, on the thread that leads the sweep: nothing here waits.
 #![allow(clippy::disallowed_methods, reason = "a gauge's reading has an age by the wall clock")]
 
-use super::{AIR, Found, OfAir, Source};
+use super::{AIR, AirLevel, OfAir, Source};
 use crate::setup::Setup;
 use crate::sweep::{Outcome, Question, Reaction, Sweep};
 use drivers::chamber::Chamber;
-use miette::{IntoDiagnostic, WrapErr};
-use realtime::Nanos;
+use miette::IntoDiagnostic;
+use realtime::{Nanos, threads};
 use sim::room::Air;
 use sim::virtual_rig::SharedRig;
 use sim::wire::{Command, Quantity, SharedPlant};
@@ -28,25 +28,25 @@ const COMMANDS: OfAir<Command> =
     [Command::AmbientPressure, Command::AirTemperature, Command::RelativeHumidity];
 
 /// The world of a virtual rig, in either time.
-pub enum World {
+pub enum SimulatedAir {
     /// In virtual time.
     Virtual(SharedRig),
     /// Behind its protocols.
     Served(SharedPlant),
 }
 
-impl World {
+impl SimulatedAir {
     fn read(&self, at: usize) -> f64 {
         match self {
-            World::Virtual(rig) => rig.rig().world.room.of(AIRS[at]),
-            World::Served(plant) => plant.now().0.measure(QUANTITIES[at]),
+            SimulatedAir::Virtual(rig) => rig.rig().world.room.of(AIRS[at]),
+            SimulatedAir::Served(plant) => plant.now().0.measure(QUANTITIES[at]),
         }
     }
 
     fn set(&self, at: usize, value: f64) {
         match self {
-            World::Virtual(rig) => rig.rig().world.room.set(AIRS[at], value),
-            World::Served(plant) => plant.now().0.command(&[(COMMANDS[at], value)]),
+            SimulatedAir::Virtual(rig) => rig.rig().world.room.set(AIRS[at], value),
+            SimulatedAir::Served(plant) => plant.now().0.command(&[(COMMANDS[at], value)]),
         }
     }
 }
@@ -82,8 +82,7 @@ impl OperatorAnswers {
         let (into, lines) = sync_channel(1);
         let read =
             move || std::io::stdin().lock().lines().map_while(Result::ok).try_for_each(|l| into.send(l));
-        let spawned = std::thread::Builder::new().name("answers".into()).spawn(read);
-        spawned.into_diagnostic().wrap_err("a thread for the answers")?;
+        threads::spawn("answers", read).into_diagnostic()?;
         Ok(OperatorAnswers::Terminal(lines))
     }
 
@@ -110,7 +109,7 @@ impl OperatorAnswers {
 /// What serves a sweep at the rig: the chamber, and whoever answers its questions.
 pub struct AmbientControl {
     chamber: Option<Chamber>,
-    world: Option<World>,
+    world: Option<SimulatedAir>,
     answers: OperatorAnswers,
     source: Source,
     question: Option<Question>,
@@ -127,7 +126,7 @@ impl AmbientControl {
     pub fn open(
         sweep: &Sweep,
         chamber: Option<&drivers::InstrumentSetup>,
-        world: Option<World>,
+        world: Option<SimulatedAir>,
         answers: OperatorAnswers,
     ) -> miette::Result<Self> {
         let used = chamber.filter(|_| sweep.sets_air());
@@ -213,9 +212,9 @@ impl AmbientControl {
             let found = match (&air, &self.world) {
                 (Some(air), _) => air.readings[at].map(|(value, taken)| {
                     let age = u64::try_from(taken.elapsed().as_nanos()).unwrap_or(u64::MAX);
-                    Found { value, at: Nanos(now.0.saturating_sub(age)), source: self.source }
+                    AirLevel { value, at: Nanos(now.0.saturating_sub(age)), source: self.source }
                 }),
-                (None, Some(world)) => Some(Found { value: world.read(at), at: now, source: self.source }),
+                (None, Some(world)) => Some(AirLevel { value: world.read(at), at: now, source: self.source }),
                 (None, None) => None,
             };
             if let Some(found) = found {

@@ -1,7 +1,7 @@
 //! Two runs' folders compared: statistics, what must be minded, what differed.
 
 use super::differences::{Difference, between, warnings};
-use super::{Comparison, ComparisonAnswer, Judged, Reference, Side, compare};
+use super::{ComparisonAnswer, Judged, Reference, RunComparison, Side, compare};
 use crate::run_dir::{record_facts, records_in};
 use crate::{Outcome, RunData};
 use miette::{IntoDiagnostic, WrapErr};
@@ -17,7 +17,7 @@ pub struct Compared {
     /// What speaks against a plain reading: shared seeds, an early ending, damage.
     pub warnings: Vec<String>,
     /// The statistics.
-    pub comparison: Comparison,
+    pub comparison: RunComparison,
     /// What differed in setup, plan, certificates and model.
     pub differences: Vec<Difference>,
     /// What is known of each, for the top of a page.

@@ -134,7 +134,7 @@ fn a_change_at_one_condition_is_seen_among_many() {
         pair(mean(0.5), mean(0.5 + difference(i)))
     };
     let pairs: Vec<Paired> = (0..80).map(of).collect();
-    let found = Comparison {
+    let found = RunComparison {
         references: [reference; 2],
         unpaired: [0; 2],
         judged: judge(&pairs, &[reference; 2]),

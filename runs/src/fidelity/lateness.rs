@@ -23,7 +23,7 @@ pub struct Late {
 }
 
 /// What the lateness of the passes of a group comes to.
-pub(super) struct Found {
+pub(super) struct GroupLateness {
     /// Way in m by which the measured friction comes after the wanted one, for each pass; none: [`HIDDEN`].
     pub ways: Vec<Option<f64>>,
     /// Root-mean-square difference of `mu'` with that way taken out of each pass that has one.
@@ -129,7 +129,7 @@ pub(super) fn of(
     speed: f64,
     known: Option<&Dynamics>,
     (lead_s, period_m, open): (f64, Option<f64>, bool),
-) -> Found {
+) -> GroupLateness {
     let slid = |pass: &&Rendered| (pass.samples[pass.samples.len() - 1].x_m - pass.samples[0].x_m).abs();
     let shortest = passes.iter().map(slid).fold(f64::INFINITY, f64::min);
     let most = period_m.map_or(f64::INFINITY, |m| UP_TO_PERIODS * m).min(UP_TO_PASS * shortest);
@@ -161,7 +161,7 @@ pub(super) fn of(
         let drive = part("loop_and_plate", before - lead_s, |s| s.wanted, |s| s.predicted);
         drive.into_iter().chain(part("sensor", sensor, |s| s.predicted, |s| s.measured)).collect()
     });
-    Found {
+    GroupLateness {
         rms_shifted: rms(&|i| ways[i].unwrap_or(0.0)),
         rms_known: expected.map(|s| rms(&|_| s * speed)),
         rms_held_out: (ways.iter().flatten().count() > 1).then(|| rms(&others)),
@@ -222,7 +222,7 @@ mod tests {
         late_s.iter().map(pass).collect()
     }
 
-    fn found(passes: &[Rendered]) -> Found {
+    fn found(passes: &[Rendered]) -> GroupLateness {
         let known = Dynamics {
             ring_time_s: 0.0,
             amplifier_s: 0.0,

@@ -9,7 +9,7 @@ use crate::run_data::remarks::Remarked;
 use crate::run_dir::{RunDir, SUMMARY};
 use crate::setup::Guards;
 use crate::supervisor::OffReport;
-use crate::sweep::{Event, MeasuredPass, Outcome, Zero, Zeros};
+use crate::sweep::{Event, MeasuredPass, Outcome, ZeroLevels, Zeros};
 use miette::{IntoDiagnostic, WrapErr};
 use models::{BuiltIn, Finger, FrictionModel};
 use realtime::clock::HeldBack;
@@ -18,7 +18,7 @@ use realtime::cycle::Config;
 use realtime::pacing::LoopReport;
 use realtime::recorder::Preamble;
 use realtime::stall_monitor::StallReport;
-use realtime::{Cause, Nanos};
+use realtime::{Nanos, TripCause};
 use serde::{Deserialize, Serialize};
 use std::collections::BTreeMap;
 use std::time::{SystemTime, UNIX_EPOCH};
@@ -177,7 +177,7 @@ impl RunWriter {
     ) -> miette::Result<()> {
         for event in events {
             if let Event::Zeros { lateral_n, normal_n, after, .. } = *event {
-                let zero = Zero { lateral_n, normal_n };
+                let zero = ZeroLevels { lateral_n, normal_n };
                 *(if after { &mut self.zeros.after } else { &mut self.zeros.before }) = Some(zero);
             }
             update(Update::Event(event));
@@ -207,7 +207,7 @@ impl RunWriter {
         let passes = crate::run_dir::passes_in(self.dir.path()).unwrap_or_default();
         let rig = crate::input::rig_file(&self.dir.path().join("rig.toml")).ok();
         let mut summary = Summary {
-            requirement: outcome.cause().and_then(Cause::requirement).map(String::from),
+            requirement: outcome.cause().and_then(TripCause::requirement).map(String::from),
             remedy: outcome.remedy().map(String::from),
             outcome,
             folder: self.dir.path().to_path_buf(),

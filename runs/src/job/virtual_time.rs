@@ -4,7 +4,7 @@ use super::force_counts::ForceCounts;
 use super::run_writer::{self, RunWriter};
 use super::telemetry::Snapshots;
 use super::{Begun, Job, Signals, Summary, Update};
-use crate::ambient::{AmbientControl, World};
+use crate::ambient::{AmbientControl, SimulatedAir};
 use crate::files::GuardedFile;
 use crate::supervisor::{self, End, OffReport, Requests, VirtualLoop};
 use crate::sweep::{Outcome, Reaction, Sweep};
@@ -39,7 +39,7 @@ pub fn run(
         );
     }
     let world = VirtualRig { world: job.world()? }.split();
-    let air = World::Virtual(world[0].clone());
+    let air = SimulatedAir::Virtual(world[0].clone());
     let mut ambient_control = AmbientControl::open(&sweep, None, Some(air), answers)?;
     let ports = ports_of(&job, world)?;
     let preamble = run_writer::preamble(&job, EPOCH_UNIX_NS)?;

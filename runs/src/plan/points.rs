@@ -137,8 +137,7 @@ impl Plan {
         for state in states {
             let here = conditions.iter().filter(|v| state_of(v) == state);
             let repeats = state.1 * self.file.replicates..(state.1 + 1) * self.file.replicates;
-            let mut visits: Vec<(&Visit<'a>, u32)> =
-                here.flat_map(|v| repeats.clone().map(move |r| (v, r))).collect();
+            let mut visits: Vec<_> = here.flat_map(|v| repeats.clone().map(move |r| (v, r))).collect();
             if self.file.randomise {
                 visits.shuffle(&mut rng);
             }

@@ -4,7 +4,7 @@ use super::html::{cell, column, columns, escape, glossary, list, note, numeric, 
 use super::plots;
 use crate::ambient::air_words;
 use crate::compare::differences::Difference;
-use crate::compare::{Compared, Comparison, ComparisonAnswer, Mean, Paired};
+use crate::compare::{Compared, ComparisonAnswer, Mean, Paired, RunComparison};
 use models::Ambient;
 use std::fmt::Write;
 use std::path::Path;
@@ -81,7 +81,7 @@ pub(super) fn air_cell(column: bool, air: &Ambient) -> String {
 /// Deviations from which a row stands out.
 const STANDS_OUT: f64 = 3.0;
 
-fn pairs(result: &Comparison) -> String {
+fn pairs(result: &RunComparison) -> String {
     let air = result.pairs.iter().any(|p| p.air != Ambient::default());
     let head =
         columns("#w, \u{b5}m|#f, kHz|#U, mm/s|#load, N|#\u{3bc}' first|#\u{3bc}' second|#difference|#in sd")

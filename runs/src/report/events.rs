@@ -5,7 +5,7 @@ use crate::ambient::AIR;
 use crate::format::number;
 use crate::run_data::remarks::ZERO_SHARE;
 use crate::sweep::Event;
-use realtime::Cause;
+use realtime::TripCause;
 
 /// An event in words.
 pub fn describe(event: &Event) -> String {
@@ -33,7 +33,7 @@ pub fn describe(event: &Event) -> String {
         ),
         Event::ArmingDisturbed { cause, held_up } => {
             let what = match cause {
-                Cause::EmergencyStop => "the emergency stop did not report, so the supply was cut".into(),
+                TripCause::EmergencyStop => "the emergency stop did not report, so the supply was cut".into(),
                 cause => format!("the test of the supply relay was interrupted ({})", cause.words()),
             };
             let why = match held_up.seconds() * 1e3 {
@@ -55,7 +55,7 @@ pub fn describe(event: &Event) -> String {
             let (lateral, normal) = (mn(lateral_n), mn(normal_n));
             format!("force offset {when} the sweep, unloaded: lateral {lateral}, normal {normal}{off}")
         }
-        Event::Tripped(trip) if trip.cause == Cause::Stopped => {
+        Event::Tripped(trip) if trip.cause == TripCause::Stopped => {
             "stopped on request: drive off, stage at rest, finger lifted".into()
         }
         Event::Tripped(trip) => format!("STOPPED for safety: {trip}\n  {}", trip.cause.remedy()),
@@ -77,7 +77,7 @@ pub fn describe(event: &Event) -> String {
              off; with a finger, release the dead-man device and grip it again"
             .into(),
         Event::PassRepeated { point, cause } => {
-            let why = cause.map_or("no contact", Cause::words);
+            let why = cause.map_or("no contact", TripCause::words);
             format!("pass {point} does not count: {why}; it is made again")
         }
         Event::Remarked { point, remark } => format!("pass {point}: {}", remark.words()),

@@ -35,7 +35,7 @@ pub struct Trace {
 
 /// The cycles of the passes within a window of loop time.
 #[derive(Debug, PartialEq, Serialize)]
-pub struct Window {
+pub struct TraceWindow {
     /// Cycles of a stretch: 1 where every cycle is given as it was recorded.
     pub stretch: usize,
     /// The passes, cut at the window's ends.
@@ -81,11 +81,11 @@ pub fn of(folder: &Path) -> miette::Result<Vec<Trace>> {
 }
 
 /// The same between two loop times in s, as finely as a screen shows it.
-pub fn within(folder: &Path, window_s: [f64; 2]) -> miette::Result<Window> {
+pub fn within(folder: &Path, window_s: [f64; 2]) -> miette::Result<TraceWindow> {
     let mut all = Vec::new();
     passes(folder, Some(window_s), |cycles| all.push(cycles.to_vec()))?;
     let stretch = all.iter().map(Vec::len).sum::<usize>().div_ceil(STRETCHES_OF_WINDOW).max(1);
-    Ok(Window { stretch, traces: all.iter().filter_map(|cycles| trace(cycles, stretch)).collect() })
+    Ok(TraceWindow { stretch, traces: all.iter().filter_map(|cycles| trace(cycles, stretch)).collect() })
 }
 
 /// Hands on the cycles of each pass.

@@ -1,7 +1,7 @@
 //! The remarks of a run's summary and page: what a reader must know of its passes.
 
 use crate::job::Summary;
-use crate::sweep::{MeasuredPass, Zero, Zeros};
+use crate::sweep::{MeasuredPass, ZeroLevels, Zeros};
 use models::PeakToPeak;
 use models::pass::{REVERSED, is_reversed};
 use serde::Serialize;
@@ -55,7 +55,7 @@ fn zeros_off(passes: &[MeasuredPass], zeros: &Zeros) -> Vec<String> {
     let still = passes.iter().filter(|p| p.pass.amplitude == PeakToPeak::ZERO);
     let friction = still.filter_map(|p| p.pass.lateral_force_n).map(f64::abs).reduce(f64::min);
     let load = passes.iter().filter_map(|p| p.commanded_normal_force_n).reduce(f64::min);
-    let axes: [(_, _, fn(&Zero) -> Option<f64>); 2] =
+    let axes: [(_, _, fn(&ZeroLevels) -> Option<f64>); 2] =
         [("lateral", friction, |z| z.lateral_n), ("normal", load, |z| z.normal_n)];
     let mut all = Vec::new();
     for (axis, least, of) in axes {
@@ -118,7 +118,7 @@ mod tests {
     /// 99 mN had none.
     #[test]
     fn a_zero_that_is_off_or_moves_is_remarked_and_is_no_load_that_was_missed() {
-        let zero = |normal_n| Some(Zero { lateral_n: Some(1e-4), normal_n: Some(normal_n) });
+        let zero = |normal_n| Some(ZeroLevels { lateral_n: Some(1e-4), normal_n: Some(normal_n) });
         let of = |before, after| {
             of_passes(&[pass(0.25 + before, Some(0.25))], &Zeros { before: zero(before), after: zero(after) })
         };

@@ -97,12 +97,7 @@ const FORCE_RATE_MIN_HZ: f64 = 20.0;
 const STATE_RATE_MIN_HZ: f64 = 10.0;
 
 /// The limits of a setup; every one that cannot be used is reported.
-pub(super) fn all_of(
-    file: &SetupFile,
-    person: bool,
-    cycle: Nanos,
-    wrong: &mut Problems<'_>,
-) -> Option<Limits> {
+pub fn all_of(file: &SetupFile, person: bool, cycle: Nanos, wrong: &mut Problems<'_>) -> Option<Limits> {
     let mut file = file.clone();
     let mut reported = Vec::new();
     loop {

@@ -34,10 +34,10 @@ pub fn library() -> Library {
 }
 
 /// Where a problem stands in the setup, as a path of keys, and what it is.
-type Problem = (Vec<&'static str>, String);
+type InputProblem = (Vec<&'static str>, String);
 
 /// Reads the profiles that do not come with the program, and puts each beside its instrument. Returns those that cannot be read.
-pub(super) fn resolve(file: &mut SetupFile, folder: &Path) -> Vec<Problem> {
+pub(super) fn resolve(file: &mut SetupFile, folder: &Path) -> Vec<InputProblem> {
     let library = library();
     let mut read: BTreeMap<String, Arc<Source>> = BTreeMap::new();
     let mut problems = Vec::new();
@@ -70,7 +70,7 @@ pub(super) fn resolve(file: &mut SetupFile, folder: &Path) -> Vec<Problem> {
 }
 
 /// The signal that gives an axis of force.
-pub struct Axis<'a> {
+pub struct ForceAxisSignal<'a> {
     /// `lateral` or `normal`.
     pub name: &'static str,
     /// The instrument that it is of.
@@ -83,7 +83,7 @@ pub struct Axis<'a> {
     pub gain: f64,
 }
 
-impl Axis<'_> {
+impl ForceAxisSignal<'_> {
     /// The signal as the profile describes it.
     pub fn described(&self) -> &instruments::schema::Signal {
         &self.profile.description.signal[self.signal.0]
@@ -97,13 +97,13 @@ impl Axis<'_> {
 
 impl SetupFile {
     /// The axes of force that its instruments give, by the setup or by the names of their signals.
-    pub fn axes(&self) -> impl Iterator<Item = Axis<'_>> {
+    pub fn axes(&self) -> impl Iterator<Item = ForceAxisSignal<'_>> {
         self.force.iter().flat_map(|instrument| {
             let both = [("lateral", &instrument.lateral), ("normal", &instrument.normal)];
             both.into_iter().filter_map(move |(name, stated)| {
                 let profile = instrument.description().ok()?;
                 let (signal, gain) = stated.as_ref().map_or((name, 1.0), |a| (a.signal.as_str(), a.gain));
-                Some(Axis { name, instrument, signal: profile.signal(signal)?, profile, gain })
+                Some(ForceAxisSignal { name, instrument, signal: profile.signal(signal)?, profile, gain })
             })
         })
     }
@@ -137,7 +137,7 @@ pub(super) fn place(table: &'static str, key: &'static str) -> Vec<&'static str>
 }
 
 /// Whether every instrument can be what the setup names it for, on the line that the setup states: all that do not.
-pub(super) fn fit(file: &SetupFile) -> Vec<Problem> {
+pub(super) fn fit(file: &SetupFile) -> Vec<InputProblem> {
     let all = file.by_table();
     let mut problems = Vec::new();
     for &(table, instrument) in &all {
@@ -169,7 +169,7 @@ pub(super) fn fit(file: &SetupFile) -> Vec<Problem> {
 }
 
 /// Instruments of different profiles at one place, where only one of them can be. One board may be named for two things.
-fn twice(all: &[(&'static str, &InstrumentSetup)]) -> Vec<Problem> {
+fn twice(all: &[(&'static str, &InstrumentSetup)]) -> Vec<InputProblem> {
     let place = |instrument: &InstrumentSetup| {
         let link = instrument.description().ok()?.description.link;
         let number = match link.kind {
@@ -201,13 +201,13 @@ fn twice(all: &[(&'static str, &InstrumentSetup)]) -> Vec<Problem> {
 
 /// A signal of one instrument that two tables of force name. Each `pty` is an instrument of its own, and so
 /// is each free port but that of Modbus TCP, whose units share one.
-fn one_signal(file: &SetupFile) -> Option<Problem> {
-    let own = |axis: &Axis<'_>| {
+fn one_signal(file: &SetupFile) -> Option<InputProblem> {
+    let own = |axis: &ForceAxisSignal<'_>| {
         let (address, kind) = (&axis.instrument.address, axis.profile.description.link.kind);
         address.ends_with("pty") || address.ends_with(":0") && kind != LinkKind::ModbusTcp
     };
-    let axes: Vec<Axis<'_>> = file.axes().filter(|axis| !own(axis)).collect();
-    let place = |axis: &Axis<'_>| {
+    let axes: Vec<ForceAxisSignal<'_>> = file.axes().filter(|axis| !own(axis)).collect();
+    let place = |axis: &ForceAxisSignal<'_>| {
         let (i, link) = (axis.instrument, &axis.profile.description.link);
         let unit = i.unit.or(link.unit);
         (i.address.clone(), i.profile.clone(), unit, i.base.or(link.base), axis.signal.0)
@@ -218,7 +218,7 @@ fn one_signal(file: &SetupFile) -> Option<Problem> {
 }
 
 /// Whether instruments at one serial line can share it: sensors with Modbus RTU can.
-fn share_lines(all: &[(&'static str, &InstrumentSetup)]) -> Result<(), Problem> {
+fn share_lines(all: &[(&'static str, &InstrumentSetup)]) -> Result<(), InputProblem> {
     let line = |instrument: &InstrumentSetup| {
         let path = instrument.address.split_once(':').map_or(instrument.address.as_str(), |(_, path)| path);
         let kind = instrument.description().ok()?.description.link.kind;
@@ -341,7 +341,7 @@ impl Setup {
             ports.push(Endpoint::force(instrument.description()?, instrument)?.1);
         }
         compose(ports)?;
-        let bare = |axis: &Axis<'_>| axis.described().si.unit != "N" && axis.gain.abs() == 1.0;
+        let bare = |axis: &ForceAxisSignal<'_>| axis.described().si.unit != "N" && axis.gain.abs() == 1.0;
         let unknown = self.file.axes().find(bare).filter(|_| self.certificates.force.is_none());
         let Some(axis) = unknown else { return Ok(()) };
         let (shown, unit) = (axis.shown(), &axis.described().si.unit);

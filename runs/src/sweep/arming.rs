@@ -9,7 +9,7 @@
 //! is repeated: the hand must release the dead-man device and grip it again, and a person starts again.
 
 use super::events::{Event, Outcome};
-use realtime::safety::{Cause, Limits, Trip, Unit};
+use realtime::safety::{Limits, Trip, TripCause, Unit};
 use realtime::{Nanos, Row};
 
 /// Time to wait for the rig to arm.
@@ -44,7 +44,7 @@ pub(super) struct Arming {
     requested: Option<Nanos>,
     asks: u32,
     /// What stood in the way last.
-    in_the_way: Option<Cause>,
+    in_the_way: Option<TripCause>,
     /// The trip that disturbed a proof last.
     disturbed: Option<Trip>,
     /// Longest lateness of a cycle since the last request of a reset.
@@ -91,12 +91,12 @@ impl Arming {
                 return Next::GiveUp(Outcome::Tripped(trip));
             }
             self.disturbed = Some(trip);
-            self.cut_reported = matches!(trip.cause, Cause::EmergencyStop | Cause::Suspended);
+            self.cut_reported = matches!(trip.cause, TripCause::EmergencyStop | TripCause::Suspended);
             return Next::Again(self.disturbed_by(trip.cause));
         }
         self.proving = row.proving.then_some(row.cycle).or(self.proving);
         // The second channel has not yet shown the commanded state.
-        let unproved = row.proving.then_some(Cause::SupplySwitch);
+        let unproved = row.proving.then_some(TripCause::SupplySwitch);
         if row.now.since(since) > ARM_WITHIN {
             let last = self.disturbed.filter(|_| row.waits_for.is_none());
             let blocking = row.waits_for.or(unproved).or(self.in_the_way);
@@ -110,13 +110,14 @@ impl Arming {
             return Next::Wait;
         }
         // What was cut before anything was armed, and needs no person, was cut for a silent emergency stop.
-        let event = (row.supply_cut && !self.cut_reported).then(|| self.disturbed_by(Cause::EmergencyStop));
+        let event =
+            (row.supply_cut && !self.cut_reported).then(|| self.disturbed_by(TripCause::EmergencyStop));
         (self.requested, self.held_up, self.cut_reported) = (Some(row.now), Nanos(0), false);
         self.asks += 1;
         Next::Ask(event)
     }
 
-    fn disturbed_by(&self, cause: Cause) -> Event {
+    fn disturbed_by(&self, cause: TripCause) -> Event {
         Event::ArmingDisturbed { cause, held_up: self.held_up }
     }
 
@@ -124,12 +125,15 @@ impl Arming {
     /// up while something that only grows old grew too old. A relay that does not follow its command is not
     /// among these, nor anything that an instrument reports.
     fn is_made_again_after(&self, trip: &Trip) -> bool {
-        let by_itself = matches!(trip.cause, Cause::Overrun | Cause::Suspended);
+        let by_itself = matches!(trip.cause, TripCause::Overrun | TripCause::Suspended);
         let grew_old = match trip.cause {
-            Cause::LateralStale | Cause::NormalStale | Cause::LateralInvalid | Cause::NormalInvalid => true,
-            Cause::AmplifierStale | Cause::StageStale => true,
+            TripCause::LateralStale
+            | TripCause::NormalStale
+            | TripCause::LateralInvalid
+            | TripCause::NormalInvalid => true,
+            TripCause::AmplifierStale | TripCause::StageStale => true,
             // An age: silent. A flag: pressed, or open.
-            Cause::EmergencyStop | Cause::Interlock => trip.unit == Unit::Second,
+            TripCause::EmergencyStop | TripCause::Interlock => trip.unit == Unit::Second,
             _ => false,
         };
         let held_up = self.held_up >= self.overrun;

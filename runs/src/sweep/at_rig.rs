@@ -10,13 +10,13 @@
 //! ([`crate::ambient::AmbientControl`]); this file only decides, so it runs in virtual time as in wall-clock time.
 
 use super::{Event, Outcome, QUIET_WITHIN, Reaction, STANDS_M_S, State, Sums, Sweep, awake};
-use crate::ambient::{AIR, By, Found, Level, Means, OfAir, Source, possible, shown};
+use crate::ambient::{AIR, AirLevel, By, Level, Means, OfAir, Source, possible, shown};
 use crate::input::{unit_meant, unit_of};
 use crate::plan::{SKIN_MOISTURE, Step, When};
 use models::{Ambient, Condition};
 use realtime::estimate::Moments;
 use realtime::ports::{Nanos, NoData};
-use realtime::safety::{Cause, Request};
+use realtime::safety::{Request, TripCause};
 use realtime::{Command, Phase, Row};
 use std::collections::{BTreeMap, VecDeque};
 
@@ -100,10 +100,10 @@ pub(super) struct AtRig {
     steps: Vec<Step>,
     /// The rig is a virtual one.
     pub(super) simulated: bool,
-    found: OfAir<Option<Found>>,
+    found: OfAir<Option<AirLevel>>,
     /// The level that was set and reached last.
     level: OfAir<Option<f64>>,
-    typed: BTreeMap<String, Found>,
+    typed: BTreeMap<String, AirLevel>,
     answer: Option<(String, Source)>,
     tasks: VecDeque<Task>,
     previous: Option<Task>,
@@ -163,8 +163,8 @@ impl AtRig {
     }
 
     /// A reading that is fresh enough; what a person confirmed holds until another level is requested.
-    fn reading(&self, at: usize, now: Nanos) -> Option<Found> {
-        let typed = |found: &Found| matches!(found.source, Source::Operator | Source::AnswersFile);
+    fn reading(&self, at: usize, now: Nanos) -> Option<AirLevel> {
+        let typed = |found: &AirLevel| matches!(found.source, Source::Operator | Source::AnswersFile);
         self.found[at].filter(|f| self.by_hand(at) || typed(f) || now.since(f.at).seconds() <= STALE_S)
     }
 
@@ -222,7 +222,7 @@ impl AtRig {
 
     /// Puts what was found into the condition of a pass, and says how each value came about.
     pub(super) fn levels(&self, planned: &Condition, condition: &mut Condition, now: Nanos) -> Vec<Level> {
-        let level = |quantity: &str, planned, value, range, found: &Found, lost| {
+        let level = |quantity: &str, planned, value, range, found: &AirLevel, lost| {
             let (quantity, age_s) = (quantity.into(), now.since(found.at).seconds());
             Level { quantity, planned, value, range, source: found.source, age_s, lost }
         };
@@ -241,8 +241,9 @@ impl AtRig {
             let off = |w: f64| silent || range.iter().any(|v| (v - w).abs() > self.tolerance[at]);
             levels.push(level(covariate.name, wanted, value, range, &found, wanted.is_some_and(off)));
         }
-        let typed =
-            |(name, found): (&String, &Found)| level(name, None, found.value, [found.value; 2], found, false);
+        let typed = |(name, found): (&String, &AirLevel)| {
+            level(name, None, found.value, [found.value; 2], found, false)
+        };
         levels.extend(self.typed.iter().map(typed));
         levels
     }
@@ -276,7 +277,7 @@ impl Sweep {
     }
 
     /// Takes in what was found of a quantity, by its place in [`AIR`].
-    pub fn found(&mut self, at: usize, found: Found) {
+    pub fn found(&mut self, at: usize, found: AirLevel) {
         self.at_rig.found[at] = Some(found);
     }
 
@@ -350,7 +351,7 @@ impl Sweep {
                     });
                     self.next_task(row, out);
                 } else if row.now.since(since) > OFF_WITHIN {
-                    self.finish(out, Outcome::WouldNotArm { blocking: Some(Cause::RefusesOff) });
+                    self.finish(out, Outcome::WouldNotArm { blocking: Some(TripCause::RefusesOff) });
                 }
             }
             Wait::Answer { since } => self.take_answer(row, since, out),
@@ -439,7 +440,7 @@ impl Sweep {
             out.commands.push(Command::Stop);
             return self.finish(out, Outcome::Stopped);
         }
-        let found = |value: f64| Found { value, at: row.now, source };
+        let found = |value: f64| AirLevel { value, at: row.now, source };
         match task {
             Task::Level(at, _) => {
                 if let Some(value) = number.filter(|_| needs) {

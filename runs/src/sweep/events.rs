@@ -8,7 +8,7 @@ use models::Pass;
 use models::prediction::Regime;
 use realtime::Nanos;
 use realtime::compare::PassComparison;
-use realtime::safety::{Cause, Remark, Trip};
+use realtime::safety::{Remark, Trip, TripCause};
 use serde::{Deserialize, Serialize};
 
 /// A finished pass with its comparison: what the record and the report hold.
@@ -40,14 +40,14 @@ pub struct MeasuredPass {
 #[derive(Clone, Copy, Debug, Default, PartialEq, Serialize, Deserialize)]
 pub struct Zeros {
     /// Before the sweep.
-    pub before: Option<Zero>,
+    pub before: Option<ZeroLevels>,
     /// After it; none where the sweep did not come to its end.
-    pub after: Option<Zero>,
+    pub after: Option<ZeroLevels>,
 }
 
 /// One of them.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
-pub struct Zero {
+pub struct ZeroLevels {
     /// Lateral.
     pub lateral_n: Option<f64>,
     /// Normal.
@@ -81,7 +81,7 @@ pub enum Event {
     /// beginning.
     ArmingDisturbed {
         /// The rule.
-        cause: Cause,
+        cause: TripCause,
         /// Longest lateness of a cycle of the loop before that; zero where only a link fell silent.
         held_up: Nanos,
     },
@@ -121,7 +121,7 @@ pub enum Event {
     /// In a pause the rig did not show itself off, at rest and lifted off: the run ends.
     PauseNotQuiet {
         /// The rule that says what was not so.
-        cause: Cause,
+        cause: TripCause,
     },
     /// The pause is over: the rig is armed again, from the proof of the second channel on.
     Resumed,
@@ -131,7 +131,7 @@ pub enum Event {
         point: u32,
         /// The rule of the sensor that stood still; none for lost contact.
         #[serde(default, skip_serializing_if = "Option::is_none")]
-        cause: Option<Cause>,
+        cause: Option<TripCause>,
     },
     /// In this pass something was not as it should be: it counts, and the record has each such cycle.
     Remarked {
@@ -245,7 +245,7 @@ pub enum Outcome {
     /// The rig would not arm; the cause that stood in the way.
     WouldNotArm {
         /// What stood in the way.
-        blocking: Option<Cause>,
+        blocking: Option<TripCause>,
     },
     /// No finger: normal force never came.
     NoContact {
@@ -263,7 +263,7 @@ pub enum Outcome {
         /// At which point.
         point: u32,
         /// The rule that says which.
-        cause: Cause,
+        cause: TripCause,
     },
     /// The stage did not come to where a pass starts in time.
     StartNotReached {
@@ -295,7 +295,7 @@ pub enum Outcome {
 
 impl Outcome {
     /// The cause that ended the sweep or prevented it, where a rule did.
-    pub fn cause(&self) -> Option<Cause> {
+    pub fn cause(&self) -> Option<TripCause> {
         match self {
             Outcome::Tripped(Trip { cause, .. }) | Outcome::Frozen { cause, .. } => Some(*cause),
             Outcome::WouldNotArm { blocking } => *blocking,
@@ -319,7 +319,7 @@ impl Outcome {
             Outcome::RecordLost | Outcome::ExposureNotSaved => {
                 Some("make room on the disk, and check that nothing else holds up its writing")
             }
-            _ => self.cause().map(Cause::remedy),
+            _ => self.cause().map(TripCause::remedy),
         }
     }
 
@@ -369,7 +369,7 @@ mod tests {
             found_c: None,
             missing: Some(realtime::ports::NoData::NotFitted),
         };
-        let (cause, at) = (Cause::Stopped, Nanos(1));
+        let (cause, at) = (TripCause::Stopped, Nanos(1));
         let trip = Trip { cause, value: f64::INFINITY, bound: 1.0, unit: Unit::Newton, cycle: 1, at };
         let all = vec![
             Event::Armed,

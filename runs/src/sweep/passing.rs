@@ -8,7 +8,7 @@ use models::psi::PsiEq17;
 use models::{Condition, Pass, PeakToPeak};
 use realtime::estimate::Moments;
 use realtime::ports::{Channel, Nanos};
-use realtime::safety::{Cause, Request};
+use realtime::safety::{Request, TripCause};
 use realtime::{Command, Phase, Row};
 
 /// A channel that ends a pass with one raw value, for a tenth of `frozen_after` and a quarter of the pass, is no data.
@@ -147,10 +147,10 @@ impl Sweep {
     }
 
     /// The channel that stood still at the end of this pass.
-    fn frozen(&self) -> Option<Cause> {
+    fn frozen(&self) -> Option<TripCause> {
         let least =
             |raw: &Raw| self.frozen_after.div_ceil(FROZEN_SHARES[0]).max(raw.samples / FROZEN_SHARES[1]);
-        let mut causes = self.sums.raw.iter().zip([Cause::LateralFrozen, Cause::NormalFrozen]);
+        let mut causes = self.sums.raw.iter().zip([TripCause::LateralFrozen, TripCause::NormalFrozen]);
         causes.find(|(raw, _)| raw.equal >= least(raw)).map(|(_, cause)| cause)
     }
 

@@ -178,8 +178,8 @@ fn a_pause_in_which_the_rig_does_not_show_itself_off_ends_the_run() {
         driven.get()
     };
     let (_, events, _, outcome) = swept_on(&world, 600.0, pause, None);
-    assert_eq!(outcome, Outcome::WouldNotArm { blocking: Some(Cause::RefusesOff) });
-    assert_eq!(events.last(), Some(&Event::PauseNotQuiet { cause: Cause::RefusesOff }));
+    assert_eq!(outcome, Outcome::WouldNotArm { blocking: Some(TripCause::RefusesOff) });
+    assert_eq!(events.last(), Some(&Event::PauseNotQuiet { cause: TripCause::RefusesOff }));
 }
 
 /// A person who changes a tip presses on the sensor: that ends nothing. An output that comes on meanwhile
@@ -208,6 +208,6 @@ fn a_hand_on_the_finger_ends_no_step_and_an_output_that_comes_on_does() {
     }
     assert_eq!(questions, 1);
     let (ms, outcome) = outcome.expect("an end");
-    assert_eq!(outcome, Outcome::WouldNotArm { blocking: Some(Cause::RefusesOff) });
+    assert_eq!(outcome, Outcome::WouldNotArm { blocking: Some(TripCause::RefusesOff) });
     assert!((22_000..23_000).contains(&ms), "{ms} ms");
 }

@@ -8,7 +8,7 @@
 //! world runs, and what a cell holds does not depend on what was read before. [`CELL`] sets the error;
 //! `averaging_error` in the tests measures it.
 
-use super::resolved::{self, Settings};
+use super::resolved::{self, MarchSettings};
 use super::{Contact, Steady};
 
 /// Width of a cell in the logarithm of each variable.
@@ -80,7 +80,7 @@ impl Averager {
             }
             // An instant that is passed through: a ridge with mass is marched for fewer cycles.
             _ if contact.has_inertia() && contact.motion.modulation == 0.0 => {
-                let settings = Settings { settle: 18, average: 6, ..Settings::default() };
+                let settings = MarchSettings { settle: 18, average: 6, ..MarchSettings::default() };
                 return resolved::steady(contact, settings).steady;
             }
             _ => return contact.steady(),

@@ -6,12 +6,12 @@
 //! of [`super::resolved`]; without loss a ridge bounces, and its friction falls much further.
 
 use super::Contact;
-use super::resolved::{Cycle, LIGHTEST_KG, March, Sums, transition};
+use super::resolved::{ContactMeans, LIGHTEST_KG, March, Sums, transition};
 use std::f64::consts::PI;
 
 impl March {
     /// One period over a compliant skin, from the plate's top; then the static compression is corrected.
-    pub(super) fn compliant_cycle(&mut self, contact: &Contact) -> Cycle {
+    pub(super) fn compliant_cycle(&mut self, contact: &Contact) -> ContactMeans {
         let omega = 2.0 * PI * contact.frequency_hz;
         let dt = 1.0 / (contact.frequency_hz * self.steps as f64);
         let m = contact.ridge.mass_kg.max(LIGHTEST_KG);
@@ -76,7 +76,7 @@ mod tests {
             contact.ridge.damping_n_s_per_m = 2.0 * zeta * f64::sqrt(1e6 * mass);
             contact.ridge.skin_loss = loss;
             for steps in [240, 2000] {
-                let settings = resolved::Settings { steps, settle: 160, average: 40 };
+                let settings = resolved::MarchSettings { steps, settle: 160, average: 40 };
                 let got = resolved::steady(&contact, settings).steady.lateral_force_n / 0.125;
                 println!("{mass:e} kg, zeta {zeta}, loss {loss}, {steps} steps: {got:.4} against {expected}");
                 let tolerance = if steps == 240 { 0.006 } else { 0.002 };

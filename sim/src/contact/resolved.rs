@@ -13,7 +13,7 @@ use std::f64::consts::PI;
 
 /// How finely and how long to march.
 #[derive(Clone, Copy, Debug, PartialEq)]
-pub struct Settings {
+pub struct MarchSettings {
     /// Steps a period.
     pub steps: usize,
     /// Cycles before averaging.
@@ -22,7 +22,7 @@ pub struct Settings {
     pub average: usize,
 }
 
-impl Default for Settings {
+impl Default for MarchSettings {
     fn default() -> Self {
         Self { steps: 240, settle: 72, average: 24 }
     }
@@ -62,7 +62,7 @@ pub(super) fn transition(stiffness: f64, damping: f64, m: f64, dt: f64) -> [f64;
 }
 
 /// Marches until the averages are there.
-pub fn steady(contact: &Contact, settings: Settings) -> Resolved {
+pub fn steady(contact: &Contact, settings: MarchSettings) -> Resolved {
     let finer = if contact.ridge.skin_ratio > 0.0 { 2 } else { 1 };
     let mut march = March::new(contact, settings.steps * finer);
     for _ in 0..settings.settle {
@@ -84,7 +84,7 @@ pub fn steady(contact: &Contact, settings: Settings) -> Resolved {
 
 /// Means over one cycle.
 #[derive(Clone, Copy, Debug, PartialEq)]
-pub struct Cycle {
+pub struct ContactMeans {
     /// Lateral force (N).
     pub lateral_n: f64,
     /// Normal force, impulses included (N).
@@ -132,7 +132,7 @@ impl March {
     }
 
     /// One period, from the plate's top; then the static compression is corrected.
-    pub fn cycle(&mut self, contact: &Contact) -> Cycle {
+    pub fn cycle(&mut self, contact: &Contact) -> ContactMeans {
         if contact.ridge.skin_ratio > 0.0 {
             return self.compliant_cycle(contact);
         }
@@ -193,8 +193,8 @@ impl March {
     }
 
     /// The means of a cycle; the static compression goes a share of the way to where the load is carried.
-    pub(super) fn balanced(&mut self, contact: &Contact, sums: &Sums, share: f64) -> Cycle {
-        let cycle = Cycle {
+    pub(super) fn balanced(&mut self, contact: &Contact, sums: &Sums, share: f64) -> ContactMeans {
+        let cycle = ContactMeans {
             lateral_n: sums.lateral * contact.frequency_hz,
             normal_n: sums.normal * contact.frequency_hz,
             contact: sums.touched as f64 / self.steps as f64,
@@ -215,7 +215,7 @@ mod tests {
         let exact = contact.steady();
         contact.ridge.mass_kg = 1e-8;
         contact.ridge.damping_n_s_per_m = 0.02;
-        let marched = steady(&contact, Settings { steps: 2000, ..Settings::default() });
+        let marched = steady(&contact, MarchSettings { steps: 2000, ..MarchSettings::default() });
         assert!((marched.normal_force_n / 0.25 - 1.0).abs() < 2e-3, "{marched:?}");
         let (got, expected) = (marched.steady.lateral_force_n, exact.lateral_force_n);
         assert!((got / expected - 1.0).abs() < 0.02, "{got} against {expected}");
@@ -238,7 +238,7 @@ mod tests {
             let mut contact = Contact::ideal(1e6, 0.4e6, 0.5, 0.25, 1e-6, 27_500.0, 0.02);
             contact.ridge.mass_kg = mass;
             contact.ridge.damping_n_s_per_m = 0.6 * (1e6 * mass).sqrt();
-            let marched = steady(&contact, Settings::default());
+            let marched = steady(&contact, MarchSettings::default());
             assert!((marched.normal_force_n / 0.25 - 1.0).abs() < 0.03, "{mass}: {marched:?}");
         }
     }

@@ -41,14 +41,14 @@ pub enum DefectsError {
 #[serde(deny_unknown_fields)]
 struct File {
     #[serde(default)]
-    defect: Vec<Entry>,
+    defect: Vec<DefectEntry>,
     #[serde(default)]
     channel: Vec<toml::Spanned<ChannelFault>>,
 }
 
 #[derive(Deserialize)]
 #[serde(deny_unknown_fields)]
-struct Entry {
+struct DefectEntry {
     name: toml::Spanned<String>,
     seed: Option<u64>,
     #[serde(default)]

@@ -1,9 +1,8 @@
 //! A sealed set on disk: what a diagnoser may read in one folder, what only the scorer may read in another.
 
 use super::Set;
-use std::fs;
-use std::io;
 use std::path::Path;
+use std::{fs, io};
 
 impl Set {
     /// Writes `points.csv`, `rig.toml` and `conditions.csv` to `open`, `label.toml` and `truth.csv` to

@@ -5,7 +5,7 @@
 //! the stiffnesses under their stated scatter, by Gauss-Newton steps on their logarithms.
 
 use crate::defects::{Defect, Defects};
-use crate::finger::Finger;
+use crate::finger::VirtualFinger;
 use crate::world::{Point, steady_forces};
 
 /// Nuisances: ln of k_n, k_l, mu0.
@@ -24,7 +24,7 @@ pub struct Case<'a> {
     /// Standard deviation of each (N).
     pub sd_n: &'a [f64],
     /// The nominal fingertip.
-    pub nominal: Finger,
+    pub nominal: VirtualFinger,
     /// Stated relative scatter of its stiffnesses.
     pub stiffness_sd: f64,
     /// Causes that act in every model, the recalibrated baseline too.
@@ -39,13 +39,13 @@ pub struct ImitationFit {
     /// Sum of squares in standard deviations, priors included.
     pub chi2: f64,
     /// The refitted fingertip.
-    pub finger: Finger,
+    pub finger: VirtualFinger,
     /// Data less model (N).
     pub residual_n: Vec<f64>,
 }
 
 /// A fingertip whose nuisances are moved by these logarithms.
-pub(super) fn moved(finger: &Finger, theta: Theta) -> Finger {
+pub(super) fn moved(finger: &VirtualFinger, theta: Theta) -> VirtualFinger {
     let mut out = *finger;
     out.normal_stiffness_n_per_m *= theta[0].exp();
     out.lateral_stiffness_n_per_m *= theta[1].exp();
@@ -55,7 +55,7 @@ pub(super) fn moved(finger: &Finger, theta: Theta) -> Finger {
 
 impl Case<'_> {
     /// Lateral forces of a model, at the true normal forces that would have shown as the measured ones.
-    pub(super) fn predict(&self, finger: &Finger, own: &Defects) -> Vec<f64> {
+    pub(super) fn predict(&self, finger: &VirtualFinger, own: &Defects) -> Vec<f64> {
         let mut defects = own.clone();
         let (before, after) = self.beside.split_at(self.place);
         defects.defects.splice(0..0, before.iter().copied());
@@ -87,7 +87,7 @@ impl Case<'_> {
     }
 
     /// Logarithms of a fingertip's nuisances over the nominal ones.
-    pub(super) fn logarithms(&self, finger: &Finger) -> Theta {
+    pub(super) fn logarithms(&self, finger: &VirtualFinger) -> Theta {
         [
             (finger.normal_stiffness_n_per_m / self.nominal.normal_stiffness_n_per_m).ln(),
             (finger.lateral_stiffness_n_per_m / self.nominal.lateral_stiffness_n_per_m).ln(),
@@ -101,7 +101,7 @@ impl Case<'_> {
     }
 
     /// The same from another start.
-    pub fn fit_from(&self, start: &Finger, defects: &Defects, iterations: usize) -> ImitationFit {
+    pub fn fit_from(&self, start: &VirtualFinger, defects: &Defects, iterations: usize) -> ImitationFit {
         let mut theta = self.logarithms(start);
         let mut model = self.predict(&moved(&self.nominal, theta), defects);
         let mut chi2 = self.chi2(&model, theta);

@@ -3,7 +3,7 @@
 use super::design::Planned;
 use super::oracle::Case;
 use crate::defects::{Defect, DefectKind, Defects, Surroundings};
-use crate::finger::{Finger, FingerConfig};
+use crate::finger::{FingerConfig, VirtualFinger};
 use crate::noise::Noise;
 use crate::world::{Point, steady_forces};
 use models::{Calibration, Pass, PassNoise, PeakToPeak, RigFile};
@@ -26,8 +26,8 @@ pub struct SetNoise {
 
 /// What a set is measured on.
 pub(super) struct SetMaker {
-    pub(super) finger: Finger,
-    pub(super) nominal: Finger,
+    pub(super) finger: VirtualFinger,
+    pub(super) nominal: VirtualFinger,
     pub(super) scatter: SetNoise,
     config: FingerConfig,
     /// Stated over true scatter: nobody knows his own repeatability exactly.
@@ -74,8 +74,8 @@ impl SetMaker {
             load_relative_sd: noise.between(0.005, 0.03),
         };
         Self {
-            finger: Finger::new(&config, seed),
-            nominal: Finger::new(&FingerConfig { stiffness_relative_sd: 0.0, ..config }, seed),
+            finger: VirtualFinger::new(&config, seed),
+            nominal: VirtualFinger::new(&FingerConfig { stiffness_relative_sd: 0.0, ..config }, seed),
             scatter,
             config,
             stated: noise.between(0.93, 1.07),
@@ -217,13 +217,13 @@ impl SetMaker {
     }
 
     /// Lateral forces of the ideal baseline of a fingertip (N).
-    pub(super) fn ideal(&self, data: &NoiseFree, finger: &Finger) -> Vec<f64> {
+    pub(super) fn ideal(&self, data: &NoiseFree, finger: &VirtualFinger) -> Vec<f64> {
         let none = Defects::none();
         data.known.iter().map(|point| steady_forces(finger, &none, point).lateral_n).collect()
     }
 
     /// Rms error over mu0 F of the ideal baseline of a fingertip.
-    pub(super) fn error(&self, data: &NoiseFree, finger: &Finger) -> f64 {
+    pub(super) fn error(&self, data: &NoiseFree, finger: &VirtualFinger) -> f64 {
         let model = self.ideal(data, finger);
         let pairs = data.known.iter().zip(data.lateral_n.iter().zip(&model));
         rms(pairs.map(|(point, (lateral, m))| (lateral - m) / (finger.mu0 * point.at.normal_force_n)))

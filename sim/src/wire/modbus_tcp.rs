@@ -3,6 +3,7 @@
 use super::SharedPlant;
 use super::device::{Device, Refused};
 use instruments::schema::Table;
+use realtime::threads;
 use std::collections::BTreeMap;
 use std::future::{Future, Ready, ready};
 use std::io;
@@ -46,7 +47,7 @@ impl ModbusTcpServer {
         let runtime = tokio::runtime::Builder::new_current_thread().enable_all().build()?;
         let (stop, stopped) = oneshot::channel();
         let units = Arc::new(Units { devices: Mutex::new(devices), plant });
-        let thread = std::thread::Builder::new().name("modbus-tcp".into()).spawn(move || {
+        let thread = threads::spawn("modbus-tcp", move || {
             runtime.block_on(async move {
                 if let Err(error) = serve(listener, units, stopped).await {
                     tracing::error!(%error, "the Modbus TCP server ended");

@@ -188,12 +188,7 @@ impl RtuLine {
 }
 
 /// The frames of a stream that are due; `due` goes on to the next one.
-pub(super) fn frames(
-    device: &mut Device,
-    stream: &Stream,
-    plant: &SharedPlant,
-    due: &mut Nanos,
-) -> Vec<Vec<u8>> {
+pub fn frames(device: &mut Device, stream: &Stream, plant: &SharedPlant, due: &mut Nanos) -> Vec<Vec<u8>> {
     let (mut plant, now) = plant.as_left();
     let Some(frame) = device.profile().frame("stream") else { return Vec::new() };
     let end = device.profile().description.link.rx_end().to_owned();

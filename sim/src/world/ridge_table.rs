@@ -7,7 +7,7 @@
 use super::{ConfigError, WorldConfig};
 use crate::contact::{Contact, Steady};
 use crate::defects::Surroundings;
-use crate::finger::Finger;
+use crate::finger::VirtualFinger;
 use crate::world::{Point, steady_contact};
 use models::{PeakToPeak, Surrogate};
 
@@ -58,7 +58,7 @@ impl RidgeTable {
 impl WorldConfig {
     /// Whether a defect changes the contact itself, beyond the plate's motion: somewhere on the travel, soon or late, at any load.
     fn alters_the_contact(&self) -> bool {
-        let finger = Finger::new(&self.finger, 0);
+        let finger = VirtualFinger::new(&self.finger, 0);
         let [from, to] = self.stage.travel_m;
         (0..LOOKED_AT).any(|i| {
             let share = f64::from(i) / f64::from(LOOKED_AT - 1);

@@ -2,7 +2,7 @@
 
 use crate::contact::Contact;
 use crate::defects::{Defects, Forces, Surroundings};
-use crate::finger::Finger;
+use crate::finger::VirtualFinger;
 
 /// A steady operating point as the world knows it.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -16,7 +16,7 @@ pub struct Point {
 }
 
 /// The contact at a point, with all that is wrong with it.
-pub fn steady_contact(finger: &Finger, defects: &Defects, point: &Point) -> Contact {
+pub fn steady_contact(finger: &VirtualFinger, defects: &Defects, point: &Point) -> Contact {
     let pp = if point.known_pp_m > 0.0 { defects.plate(&point.at, point.known_pp_m).max(0.0) } else { 0.0 };
     let amplitude = models::quantity::PeakToPeak::from_metres(pp);
     let mut contact = finger.contact(
@@ -30,7 +30,7 @@ pub fn steady_contact(finger: &Finger, defects: &Defects, point: &Point) -> Cont
 }
 
 /// The mean forces in the sensor's frame at a point, without noise.
-pub fn steady_forces(finger: &Finger, defects: &Defects, point: &Point) -> Forces {
+pub fn steady_forces(finger: &VirtualFinger, defects: &Defects, point: &Point) -> Forces {
     let friction = steady_contact(finger, defects, point).steady().lateral_force_n;
     let mut forces = Forces { lateral_n: point.at.direction * friction, normal_n: point.at.normal_force_n };
     defects.forces(&point.at, &mut forces);

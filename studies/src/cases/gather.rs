@@ -82,8 +82,7 @@ pub fn gather(study: &Study, to: &Path, any_build: bool) -> miette::Result<Gathe
     let holes = holes(&there, cases);
     if !holes.is_empty() {
         let missing = length(&holes);
-        let mut named: Vec<String> =
-            holes.iter().take(NAMED).map(|h| format!("{}..{}", h.start, h.end)).collect();
+        let mut named: Vec<_> = holes.iter().take(NAMED).map(|h| format!("{}..{}", h.start, h.end)).collect();
         named.extend((holes.len() > NAMED).then(|| format!("and {} more", holes.len() - NAMED)));
         let help = "`muprime submit` with the same folder runs what is missing";
         miette::bail!(help = help, "{missing} of {cases} cases have no result: {}", named.join(", "));

@@ -4,14 +4,14 @@ use super::Reproduced;
 use super::plot::{Chart, Series};
 use super::reading::{self, Reading};
 use miette::IntoDiagnostic;
-use models::spring_slider::{self, Cycle};
+use models::spring_slider::{self, SlipCycle};
 use models::{Condition, Finger};
 
 fn condition(reading: Reading, w_m: f64, normal_force_n: f64) -> Condition {
     Condition { amplitude: reading.motion(w_m), normal_force_n, ..Condition::paper() }
 }
 
-fn solve(reading: Reading, w_m: f64, normal_force_n: f64, finger: &Finger) -> miette::Result<Cycle> {
+fn solve(reading: Reading, w_m: f64, normal_force_n: f64, finger: &Finger) -> miette::Result<SlipCycle> {
     spring_slider::solve(&condition(reading, w_m, normal_force_n), finger).into_diagnostic()
 }
 

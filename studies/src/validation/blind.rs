@@ -11,9 +11,8 @@ use diagnosis::constants::Constants;
 use diagnosis::data::{RigFile, Table};
 use diagnosis::{Options, Verdict, diagnose};
 use miette::IntoDiagnostic;
-use models::Condition;
-use models::covariate;
-use reliability::{Entry, identifiable};
+use models::{Condition, covariate};
+use reliability::{StatedChance, identifiable};
 use serde::{Deserialize, Serialize};
 use sim::sealed::{Ask, DETECTABLE, PAIR_LEAVES, Set, Stratum, generate};
 use std::collections::BTreeMap;
@@ -22,7 +21,7 @@ use std::sync::Arc;
 /// Which sets are made and how they are diagnosed: options of the command line, and settings of cases.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize, clap::Args)]
 #[serde(default, deny_unknown_fields)]
-pub struct Settings {
+pub struct BlindStudy {
     /// Seed of the first set
     #[arg(long, default_value_t = 1)]
     pub seed: u64,
@@ -41,7 +40,7 @@ pub struct Settings {
     pub constant: Vec<String>,
 }
 
-impl Settings {
+impl BlindStudy {
     /// How the sets are diagnosed.
     ///
     /// # Errors
@@ -65,9 +64,9 @@ fn stratum_of(text: &str) -> Result<Stratum, String> {
         .map_err(|_| "none, single, pair, alias or outside is needed".to_string())
 }
 
-impl Default for Settings {
+impl Default for BlindStudy {
     fn default() -> Self {
-        Settings { seed: 1, stratum: None, no_pairs: false, without: Vec::new(), constant: Vec::new() }
+        BlindStudy { seed: 1, stratum: None, no_pairs: false, without: Vec::new(), constant: Vec::new() }
     }
 }
 
@@ -103,7 +102,7 @@ pub struct Scored {
     /// Whether the first entry is the truth.
     pub top_right: bool,
     /// Every entry of the list of hypotheses, and whether it is the truth.
-    pub entries: Vec<Entry>,
+    pub entries: Vec<StatedChance>,
     /// Distance of the cause from the library's law of its name; see [`distance`].
     pub distance: Option<f64>,
     /// Claimed shrinkage.
@@ -186,7 +185,7 @@ pub fn score(set: &Set, options: &Options) -> miette::Result<Scored> {
     let both = named.iter().zip(&wanted).filter(|(a, b)| **a && **b).count() as f64;
     let sizes = (named.iter().filter(|x| **x).count() + wanted.iter().filter(|x| **x).count()) as f64;
     let entries = report.hypotheses.iter();
-    let entries = entries.map(|h| Entry { probability: h.probability, right: says_truth(&h.effects) });
+    let entries = entries.map(|h| StatedChance { probability: h.probability, right: says_truth(&h.effects) });
     let region_f1 = wanted.iter().any(|x| *x).then(|| 2.0 * both / sizes.max(1.0));
 
     Ok(Scored {
@@ -309,12 +308,10 @@ pub fn figures(all: &[Scored]) -> Vec<Figure> {
     let named_right = |s: &Scored| s.verdict == Verdict::Named && s.top_right;
     let named_wrong = |s: &Scored| s.verdict == Verdict::Named && !s.top_right;
     let clear: Vec<&Scored> = all.iter().filter(single).filter(detectable).filter(|s| s.decidable).collect();
-    let faint_singles: Vec<&Scored> =
-        all.iter().filter(single).filter(faint).filter(|s| s.decidable).collect();
+    let faint_singles: Vec<_> = all.iter().filter(single).filter(faint).filter(|s| s.decidable).collect();
     let murky: Vec<&Scored> = all.iter().filter(single).filter(detectable).filter(|s| !s.decidable).collect();
     let none: Vec<&Scored> = all.iter().filter(|s| s.stratum == Stratum::None).collect();
-    let outside: Vec<&Scored> =
-        all.iter().filter(|s| s.stratum == Stratum::Outside).filter(detectable).collect();
+    let outside: Vec<_> = all.iter().filter(|s| s.stratum == Stratum::Outside).filter(detectable).collect();
     let leaves = |s: &&Scored| s.best_single_leaves.is_some_and(|share| share >= PAIR_LEAVES);
     let pairs = all.iter().filter(|s| s.stratum == Stratum::Pair).filter(leaves).filter(detectable);
     let of = |list: &[&Scored], f: &dyn Fn(&Scored) -> bool| list.iter().map(|s| f(s)).collect::<Vec<bool>>();
@@ -382,8 +379,7 @@ pub fn figures(all: &[Scored]) -> Vec<Figure> {
 
 /// Debiased calibration error of the first entry's probability, in ten bins of equal count.
 fn calibration<'a>(name: &'static str, sets: impl Iterator<Item = &'a Scored>) -> Figure {
-    let mut list: Vec<(f64, f64)> =
-        sets.map(|s| (s.top_probability, f64::from(u8::from(s.top_right)))).collect();
+    let mut list: Vec<_> = sets.map(|s| (s.top_probability, f64::from(u8::from(s.top_right)))).collect();
     list.sort_by(|a, b| a.0.total_cmp(&b.0));
     let mut error = 0.0;
     for bin in list.chunks(list.len().div_ceil(10).max(1)) {

@@ -11,7 +11,7 @@ mod tamper;
 
 pub use rows::{Expect, FaultRow, Moment, Pace, ROWS};
 use runs::out;
-pub use scene::{Core, Found, Scene, Strike, run, run_with};
+pub use scene::{Core, Scene, SceneResult, Strike, run, run_with};
 pub use search::Tally;
 
 /// Worst reactions beside their bounds, in cycles of 1 ms.

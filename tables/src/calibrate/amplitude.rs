@@ -7,8 +7,7 @@ use calibration::amplitude::gain::{GainForm, fit};
 use calibration::amplitude::map::mode_shape;
 use calibration::amplitude::resonance::sweep;
 use calibration::amplitude::{AmplitudeError, AmplitudePoint};
-use runs::Setup;
-use runs::say;
+use runs::{Setup, say};
 use std::path::{Path, PathBuf};
 
 /// Arguments.
@@ -77,7 +76,7 @@ enum FormChoice {
 }
 
 /// Calibrates; a table that is taken live goes beside the certificate.
-pub fn outcome_of(
+pub fn calibrate(
     of: &Of<Args>,
     bench: &dyn Bench,
     sources: &mut Sources,

@@ -14,7 +14,7 @@ pub struct Args {
 }
 
 /// Calibrates.
-pub fn outcome_of(args: &Args, sources: &mut Sources) -> miette::Result<CalibrationResult> {
+pub fn calibrate(args: &Args, sources: &mut Sources) -> miette::Result<CalibrationResult> {
     let rows = columns(sources, &args.readings, ["time_s", "net_counts"], &[])?;
     let shown = args.readings.display();
     if rows.iter().any(|r| r[0] < 0.0) || rows.windows(2).any(|w| w[1][0] <= w[0][0]) {

@@ -61,7 +61,7 @@ pub struct Args {
 }
 
 /// Calibrates; the skin and the springs that were identified go into `more`.
-pub fn outcome_of(args: &Args, sources: &mut Sources, more: &mut More) -> miette::Result<CalibrationResult> {
+pub fn calibrate(args: &Args, sources: &mut Sources, more: &mut More) -> miette::Result<CalibrationResult> {
     let mut found = FingerFit::default();
     let refused = |path: &PathBuf, e: FingerError| miette::miette!("{}: no certificate: {e}", path.display());
     for (name, path) in

@@ -53,11 +53,7 @@ pub struct Args {
 }
 
 /// Calibrates.
-pub fn outcome_of(
-    args: &Args,
-    bench: &dyn Bench,
-    sources: &mut Sources,
-) -> miette::Result<CalibrationResult> {
+pub fn calibrate(args: &Args, bench: &dyn Bench, sources: &mut Sources) -> miette::Result<CalibrationResult> {
     let weighing = Weighing {
         gravity_m_s2: args.gravity_m_s2,
         gravity_relative_sd: args.gravity_relative_sd,

@@ -15,7 +15,7 @@ pub struct Args {
 }
 
 /// Calibrates.
-pub fn outcome_of(args: &Args, sources: &mut Sources) -> miette::Result<CalibrationResult> {
+pub fn calibrate(args: &Args, sources: &mut Sources) -> miette::Result<CalibrationResult> {
     let rows = columns(sources, &args.tilts, ["tilt_rad", "lateral_force_n", "normal_force_n"], &[])?;
     let shown = args.tilts.display();
     let readings: Vec<TiltReading> =

@@ -24,7 +24,7 @@ pub struct Args {
 }
 
 /// Calibrates.
-pub fn outcome_of(args: &Args, sources: &mut Sources) -> miette::Result<CalibrationResult> {
+pub fn calibrate(args: &Args, sources: &mut Sources) -> miette::Result<CalibrationResult> {
     if args.edges.is_empty() && args.steps.is_empty() && args.clock.is_empty() {
         miette::bail!("give --edges, --steps or --clock at least once, as CHANNEL=FILE");
     }

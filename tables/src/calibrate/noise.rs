@@ -43,7 +43,7 @@ fn rail(samples: &[i64]) -> Option<i64> {
 }
 
 /// Calibrates.
-pub fn outcome_of(args: &Args, sources: &mut Sources) -> miette::Result<CalibrationResult> {
+pub fn calibrate(args: &Args, sources: &mut Sources) -> miette::Result<CalibrationResult> {
     if !(args.rate_hz > 0.0 && args.rate_hz.is_finite()) {
         miette::bail!("--rate-hz {}: above zero", args.rate_hz);
     }

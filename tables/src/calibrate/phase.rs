@@ -6,8 +6,7 @@ use calibration::phase::{
     Acquisition, PhasePoint, RepeatedShift, Shift, Waveforms, outcome, repeated, shift, write_phases,
 };
 use models::PeakToPeak;
-use runs::Setup;
-use runs::say;
+use runs::{Setup, say};
 use std::path::PathBuf;
 
 /// Arguments.
@@ -57,11 +56,7 @@ pub struct Args {
 }
 
 /// Calibrates.
-pub fn outcome_of(
-    args: &Args,
-    bench: &dyn Bench,
-    sources: &mut Sources,
-) -> miette::Result<CalibrationResult> {
+pub fn calibrate(args: &Args, bench: &dyn Bench, sources: &mut Sources) -> miette::Result<CalibrationResult> {
     let settings = |name: &String| bench.vibrometer(&Setup::load(name)?, args.frequency_hz);
     let settings = args.setup.as_ref().map(settings).transpose()?;
     settings.iter().for_each(|settings| say!("vibrometer: {settings}"));

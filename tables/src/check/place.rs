@@ -6,7 +6,7 @@ use serde::Serialize;
 
 /// One problem, for programs.
 #[derive(Clone, Debug, Serialize)]
-pub struct Problem {
+pub struct InputProblem {
     /// What is wrong.
     pub problem: String,
     /// Line and column of the place, from 1; none where the file has none.
@@ -18,8 +18,8 @@ pub struct Problem {
 }
 
 /// The single problems of a refusal.
-pub fn problems_of(report: &miette::Report) -> Vec<Problem> {
-    let mut all: Vec<Problem> = report.related().into_iter().flatten().map(one).collect();
+pub fn problems_of(report: &miette::Report) -> Vec<InputProblem> {
+    let mut all: Vec<InputProblem> = report.related().into_iter().flatten().map(one).collect();
     if all.is_empty() {
         let mut problem = one(report.as_ref());
         for cause in report.chain().skip(1) {
@@ -37,9 +37,9 @@ fn place_of(of: &dyn miette::Diagnostic) -> Option<(usize, usize, Option<String>
     Some((span.line() + 1, span.column() + 1, span.name().map(str::to_string)))
 }
 
-fn one(of: &dyn miette::Diagnostic) -> Problem {
+fn one(of: &dyn miette::Diagnostic) -> InputProblem {
     let (line, column) = place_of(of).map(|(line, column, _)| (line, column)).unzip();
-    Problem { problem: of.to_string(), line, column, help: of.help().map(|h| h.to_string()) }
+    InputProblem { problem: of.to_string(), line, column, help: of.help().map(|h| h.to_string()) }
 }
 
 /// A refusal whose every problem has a place in the file, where the file has such a key, and a remedy.
@@ -59,7 +59,7 @@ pub fn with_place_and_help(report: miette::Report, name: &str, kind: Option<&str
             miette::miette!(help = help, "{}", found[0].problem)
         };
     };
-    let elsewhere = |p: &Problem| p.line.is_none() && kind == Some("plan");
+    let elsewhere = |p: &InputProblem| p.line.is_none() && kind == Some("plan");
     if found.iter().any(elsewhere) {
         return report;
     }

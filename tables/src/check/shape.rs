@@ -6,7 +6,7 @@ use runs::input::{Problems, in_si, unit_of};
 use serde_json::{Map, Value};
 use std::ops::Range;
 use toml::de::DeTable;
-use tree::{Entry, Is, Node, TextRange, entries, types};
+use tree::{Is, Node, TextRange, TreeEntry, entries, types};
 
 mod nearest;
 mod tree;
@@ -141,7 +141,7 @@ fn mistyped(schema: &Value, Node { is, span }: &Node, path: &str) -> Wrong {
 fn object(
     root: &Value,
     schema: &Value,
-    entries: &[Entry],
+    entries: &[TreeEntry],
     path: &str,
     place: TextRange,
     wrong: &mut Vec<Wrong>,

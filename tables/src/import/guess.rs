@@ -78,8 +78,7 @@ fn is_in(list: &str, plain: &str) -> bool {
 pub fn sums_up(text: &str, below: bool) -> bool {
     let small = text.to_lowercase();
     let words = small.split(|c: char| !c.is_alphanumeric() && c != '\u{304}');
-    let words: Vec<&str> =
-        words.filter(|w| !w.is_empty() && !w.bytes().all(|b| b.is_ascii_digit())).collect();
+    let words: Vec<_> = words.filter(|w| !w.is_empty() && !w.bytes().all(|b| b.is_ascii_digit())).collect();
     let sums = |word: &&str| MEANS.contains(word) || is_in(SUMS, word) || is_in(STATISTICS, word);
     words.iter().all(|w| sums(w) || is_in(BESIDE, w))
         && (below && !words.is_empty() || words.iter().any(sums))

@@ -21,12 +21,12 @@ pub fn read(bytes: &[u8], sheet: Option<&str>, wanted: &[String]) -> miette::Res
         )
     };
     let file = File::from_bytes(bytes.to_vec()).map_err(wrong)?;
-    let mut found = Found { matlab, most: super::most_cells(bytes.len()), contents: Contents::default() };
+    let mut found = Datasets { matlab, most: super::most_cells(bytes.len()), contents: Contents::default() };
     found.walk(&file.root(), "", 0).map_err(wrong)?;
     table(if matlab { "MAT 7.3" } else { "HDF5" }, sheet, wanted, found.contents)
 }
 
-struct Found {
+struct Datasets {
     matlab: bool,
     /// Cells that may still be read.
     most: usize,
@@ -57,7 +57,7 @@ fn for_columns(about: &HashMap<String, AttrValue>, names: &[&str], columns: usiz
     [',', ';', '|', ' '].into_iter().map(split).find(|all| all.len() == columns).unwrap_or_default()
 }
 
-impl Found {
+impl Datasets {
     fn walk(&mut self, group: &Group, around: &str, depth: usize) -> Result<(), Error> {
         let inside =
             |name: &str| if around.is_empty() { name.to_string() } else { format!("{around}/{name}") };

@@ -143,8 +143,7 @@ fn matrix(mut rest: &[u8], big: bool, around: &str, depth: usize, found: &mut Co
         return Some(());
     }
     let sizes = Element::next(&mut rest, big)?;
-    let sizes: Vec<usize> =
-        sizes.data.chunks_exact(4).map(|c| word(c, big).map_or(0, |n| n as usize)).collect();
+    let sizes: Vec<_> = sizes.data.chunks_exact(4).map(|c| word(c, big).map_or(0, |n| n as usize)).collect();
     let own = Element::next(&mut rest, big)?.text();
     let name = match (around.is_empty(), own.is_empty()) {
         (true, _) => own,

@@ -4,8 +4,7 @@ use super::grid::{Cell, Grid, Row};
 use super::map::{Map, way};
 use super::targets::{COUNT, ColumnKind, Id};
 use instruments::{Dimension, Unit};
-use models::covariate;
-use models::{Condition, Pass, PeakToPeak};
+use models::{Condition, Pass, PeakToPeak, covariate};
 use serde::Serialize;
 
 /// Why a cell of a number is not taken.

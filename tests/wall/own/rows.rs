@@ -1,12 +1,12 @@
 //! The faults of the five instruments, and what must follow.
 
-use realtime::safety::Cause::{self, *};
+use realtime::safety::TripCause::{self, *};
 use std::fmt;
 
 /// What follows a fault.
 pub enum Fate {
     /// A trip with one of these causes; the output is off within so many ms of the strike.
-    Trips(&'static [Cause], f64),
+    Trips(&'static [TripCause], f64),
     /// No trip; this counter of the instrument's link has gone up.
     GoesOn(&'static str),
     /// No trip, and nobody can know of it: why.
@@ -54,14 +54,14 @@ macro_rules! rows {
 
 use Fate::{GoesOn, Trips, Unseen};
 
-const SILENT: &[Cause] = &[LateralStale, NormalStale];
-const LOSSY: &[Cause] = &[LateralStale, NormalStale, LateralLossy, NormalLossy];
-const STILL: &[Cause] = &[LateralFrozen, NormalFrozen];
-const INVALID: &[Cause] = &[LateralInvalid, NormalInvalid];
-const RAIL: &[Cause] = &[LateralSaturated, NormalSaturated];
-const WILD: &[Cause] = &[LateralOverforce, ForceRate, Noisy];
-const DRIVE_GONE: &[Cause] = &[AmplifierStale];
-const STAGE_GONE: &[Cause] = &[StageStale];
+const SILENT: &[TripCause] = &[LateralStale, NormalStale];
+const LOSSY: &[TripCause] = &[LateralStale, NormalStale, LateralLossy, NormalLossy];
+const STILL: &[TripCause] = &[LateralFrozen, NormalFrozen];
+const INVALID: &[TripCause] = &[LateralInvalid, NormalInvalid];
+const RAIL: &[TripCause] = &[LateralSaturated, NormalSaturated];
+const WILD: &[TripCause] = &[LateralOverforce, ForceRate, Noisy];
+const DRIVE_GONE: &[TripCause] = &[AmplifierStale];
+const STAGE_GONE: &[TripCause] = &[StageStale];
 
 rows! {
     "strain-gauge" "silence" "silence" 1000 Trips(SILENT, 800.0), always;

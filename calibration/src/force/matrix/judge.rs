@@ -19,8 +19,7 @@ pub(super) fn refuse_unfit(readings: &[LoadReading], options: &Options) -> Resul
     }
     let needed = if options.linearity == Linearity::Linear { 3 } else { 4 };
     for axis in AXES {
-        let mut loads: Vec<f64> =
-            readings.iter().filter(|r| r.axis == Some(axis)).map(|r| r.load_n).collect();
+        let mut loads: Vec<_> = readings.iter().filter(|r| r.axis == Some(axis)).map(|r| r.load_n).collect();
         loads.sort_by(f64::total_cmp);
         loads.dedup_by(|a, b| (*a - *b).abs() < 1e-9 + 1e-6 * b.abs());
         if loads.len() < needed {
@@ -60,11 +59,7 @@ fn plateau(readings: &[LoadReading]) -> Result<(), ForceError> {
 }
 
 /// After the fit: swapped axes, drifting zero, lack of fit, wandering zero.
-pub(super) fn judge(
-    fit: &mut ForceFit,
-    readings: &[LoadReading],
-    options: &Options,
-) -> Result<(), ForceError> {
+pub fn judge(fit: &mut ForceFit, readings: &[LoadReading], options: &Options) -> Result<(), ForceError> {
     let gain = |channel, axis| fit.value(channel, Term::Gain(axis));
     let blind = AXES.map(|a| gain(a, a).abs() <= gain(AXES[1 - a as usize], a).abs());
     if blind[0] && blind[1] {

@@ -78,7 +78,8 @@ pub fn run(args: &AdaptArgs, json: bool) -> miette::Result<ExitCode> {
     let steady = Steady { tolerance: args.tolerance, at_most: args.at_most, ..Steady::default() };
     let header = |spans: BTreeMap<String, ridge::ValueRange>, cases: u64| {
         let (elements, base) = (args.elements, base.clone());
-        let settings = ridge::Settings { elements, steady, base, spans, first: HELD_OUT_FROM, case: None };
+        let settings =
+            ridge::RidgeSettings { elements, steady, base, spans, first: HELD_OUT_FROM, case: None };
         settings.check_spans()?;
         Header::of(&ridge::KIND, &settings, cases)
     };

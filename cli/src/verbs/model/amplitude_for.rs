@@ -4,9 +4,8 @@ use super::conditions::{ConditionArgs, YOUNG_MODULUS_PA};
 use super::refused;
 use crate::verbs::prelude::*;
 use clap::Args;
-use models::inverse;
 use models::prediction::Validity;
-use models::{PeakToPeak, Surrogate};
+use models::{PeakToPeak, Surrogate, inverse};
 use runs::format::{number, quantity, to_its_uncertainty};
 
 /// Arguments of `muprime model amplitude-for`.

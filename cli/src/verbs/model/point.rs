@@ -8,8 +8,7 @@ use clap::builder::{PossibleValuesParser, TypedValueParser};
 use models::prediction::EmpiricalPsi;
 use models::psi::{PsiEq16, PsiEq17};
 use models::rig_file::STIFFNESS_N_PER_M;
-use models::spring_slider;
-use models::{BuiltIn, Condition, Finger, Reading, Surrogate};
+use models::{BuiltIn, Condition, Finger, Reading, Surrogate, spring_slider};
 use runs::format::quantity;
 use serde::Serialize;
 

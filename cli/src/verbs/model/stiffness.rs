@@ -5,9 +5,10 @@ use super::refused;
 use crate::verbs::prelude::*;
 use clap::Args;
 use models::Reading;
-use models::ridge::short_study;
 use models::ridge::static_stiffness::{HeldAt, StaticStiffness, of_case};
-use models::ridge::{FrictionRule, RidgeCase, RidgeError, RidgeGeometry, RidgeProfile, Strain, case};
+use models::ridge::{
+    FrictionRule, RidgeCase, RidgeError, RidgeGeometry, RidgeProfile, Strain, case, short_study,
+};
 use serde::Serialize;
 
 /// Arguments of `muprime model stiffness`.

@@ -7,7 +7,7 @@ use crate::verbs::prelude::*;
 use clap::Args;
 use models::ridge::study::content_key;
 use models::ridge::{RidgeCase, case};
-use models::surrogate::{Grid, GridPoint, InterpolationError, Surrogate, TableResult};
+use models::surrogate::{GridPoint, InterpolationError, Surrogate, SurrogateGrid, TableResult};
 use std::collections::HashMap;
 use std::time::Instant;
 use studies::cases::file::Header;
@@ -97,9 +97,9 @@ fn fig_9_study(out: &Path, study: Study) -> miette::Result<(PathBuf, usize, usiz
 }
 
 fn surrogate(out: &Path) -> miette::Result<(PathBuf, usize, usize)> {
-    let grid = Grid::SHIPPED;
+    let grid = SurrogateGrid::SHIPPED;
     let (points, held_out) = (grid.points(), grid.held_out(HELD_OUT));
-    let settings = Grid::settings();
+    let settings = SurrogateGrid::settings();
     let header = Header::of(&table::KIND, &serde_json::Value::Null, (points.len() + HELD_OUT) as u64)?;
     let entries = all(out, "surrogate-table", header, None)?;
     let key = |p: &GridPoint| content_key(&p.case, &settings);

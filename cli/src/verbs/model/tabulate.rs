@@ -3,7 +3,7 @@
 use crate::verbs::prelude::*;
 use clap::Args;
 use models::law_table::ANSWERS;
-use models::law_table::grid::{Grid, Tabulated};
+use models::law_table::grid::{LawGrid, Tabulated};
 use std::io::Write;
 use std::process::{Command, Stdio};
 
@@ -36,7 +36,7 @@ pub struct TabulateArgs {
 /// Tabulates, checks, writes; refused: a grid that is none, a program that fails or answers what is no law, a
 /// table that is too coarse; nothing is written then.
 pub fn run(args: &TabulateArgs, json: bool) -> miette::Result<ExitCode> {
-    let grid = Grid::parse(args.grid.iter().map(String::as_str)).map_err(|e| miette::miette!("{e}"))?;
+    let grid = LawGrid::parse(args.grid.iter().map(String::as_str)).map_err(|e| miette::miette!("{e}"))?;
     let answers = answers(&args.command, &conditions(&grid, args.checks))?;
     let made = grid.table(args.checks, &answers).map_err(|e| {
         let help = "correct the program, or choose a grid within its domain";
@@ -58,7 +58,7 @@ pub fn run(args: &TabulateArgs, json: bool) -> miette::Result<ExitCode> {
 }
 
 /// What the program reads.
-fn conditions(grid: &Grid, checks: usize) -> String {
+fn conditions(grid: &LawGrid, checks: usize) -> String {
     let mut text = grid.columns().join(",") + "\n";
     for row in grid.conditions(checks) {
         text += &(row.iter().map(|v| format!("{v:e}")).collect::<Vec<_>>().join(",") + "\n");

@@ -34,12 +34,12 @@ impl Past {
 
 /// A covariate, of the pass itself or of the pass before.
 #[derive(Debug, Clone)]
-pub(super) struct Axis {
+pub(super) struct ShapeAxis {
     pub(super) covariate: &'static Covariate,
     pub(super) past: Option<Arc<Past>>,
 }
 
-impl Axis {
+impl ShapeAxis {
     /// The value on the covariate's scale: of the pass before, whether the direction was the same, and how
     /// far away the place was. `None` where a condition does not state it, or starts its run.
     pub(super) fn of(&self, p: &Condition, largest_amplitude: f64) -> Option<f64> {
@@ -57,12 +57,12 @@ impl Axis {
 
     /// The histories that a table can separate from the settings of its passes. Where settings rise from pass to
     /// pass, what the pass before had is what the pass has, and a law.
-    pub(super) fn histories(passes: &[Condition], past: &Arc<Past>, largest_amplitude: f64) -> Vec<Axis> {
+    pub fn histories(passes: &[Condition], past: &Arc<Past>, largest_amplitude: f64) -> Vec<ShapeAxis> {
         let own: Vec<Vec<f64>> =
             COVARIATES.iter().filter_map(|c| scaled(c, passes, largest_amplitude)).collect();
         let set = |c: &&&Covariate| matches!(c.role, CovariateRole::Setting | CovariateRole::Place);
         let all = COVARIATES.iter().filter(set);
-        let all = all.map(|c| Axis { covariate: c, past: Some(past.clone()) });
+        let all = all.map(|c| ShapeAxis { covariate: c, past: Some(past.clone()) });
         all.filter(|axis| {
             let rows: Vec<(usize, f64)> = passes
                 .iter()

@@ -1,6 +1,6 @@
 //! What a shape is made of: its form over a covariate, and what it is in proportion to.
 
-use super::axis::Axis;
+use super::axis::ShapeAxis;
 use super::scatter_model::Under;
 use crate::constants::Constants;
 use crate::regression::{COUNT, Kernel, Problem, scale};
@@ -98,7 +98,7 @@ impl Way {
 /// Where the best of a shape's places is, and under which scatter.
 #[derive(Debug, Clone)]
 pub(super) struct Placement {
-    pub(super) axis: Axis,
+    pub(super) axis: ShapeAxis,
     pub(super) form: ShapeForm,
     pub(super) way: Way,
     /// Deviation of its size, in units of the way.

@@ -1,6 +1,6 @@
 //! Where shapes may be: the places of each kind over each covariate of a table, and over its histories.
 
-use super::axis::{Axis, Past};
+use super::axis::{Past, ShapeAxis};
 use super::form::ShapeForm;
 use super::shapes::ShapeKind;
 use crate::data::range;
@@ -35,16 +35,16 @@ const REACHES: [f64; 3] = [0.05, 0.15, 0.4];
 pub(super) type Placed = (f64, ShapeForm);
 
 /// Every kind of shape over every axis that may have it.
-pub(super) fn placed(part: &Problem, past: &Arc<Past>) -> Vec<(ShapeKind, Axis, Vec<Placed>)> {
+pub(super) fn placed(part: &Problem, past: &Arc<Past>) -> Vec<(ShapeKind, ShapeAxis, Vec<Placed>)> {
     let largest = part.design.largest_amplitude_m;
     let own = COVARIATES.into_iter().flat_map(|covariate| {
-        let axis = Axis { covariate, past: None };
+        let axis = ShapeAxis { covariate, past: None };
         let x: Option<Vec<f64>> = part.passes.iter().map(|p| axis.of(p, largest)).collect();
         let values = covariate.of_all(&part.passes);
         let list = x.zip(values).map(|(x, values)| over(&axis, part, &x, &values)).unwrap_or_default();
         list.into_iter().map(move |(kind, places)| (kind, axis.clone(), places))
     });
-    let histories = Axis::histories(&part.passes, past, largest).into_iter().map(|axis| {
+    let histories = ShapeAxis::histories(&part.passes, past, largest).into_iter().map(|axis| {
         let places = remembered(&axis, part);
         (ShapeKind::Memory, axis, places)
     });
@@ -52,7 +52,7 @@ pub(super) fn placed(part: &Problem, past: &Arc<Past>) -> Vec<(ShapeKind, Axis, 
 }
 
 /// The shapes that a covariate may have: a trend alone where it has few levels, for there a jump is a law.
-fn over(axis: &Axis, part: &Problem, x: &[f64], values: &[f64]) -> Vec<(ShapeKind, Vec<Placed>)> {
+fn over(axis: &ShapeAxis, part: &Problem, x: &[f64], values: &[f64]) -> Vec<(ShapeKind, Vec<Placed>)> {
     let covariate = axis.covariate;
     let mut order: Vec<usize> = (0..x.len()).collect();
     order.sort_by(|&a, &b| x[a].total_cmp(&x[b]));
@@ -109,7 +109,7 @@ fn over(axis: &Axis, part: &Problem, x: &[f64], values: &[f64]) -> Vec<(ShapeKin
 }
 
 /// Periods over a range of a covariate, in its unit.
-fn periods(axis: &Axis, passes: usize, [low, high]: [f64; 2]) -> Vec<Placed> {
+fn periods(axis: &ShapeAxis, passes: usize, [low, high]: [f64; 2]) -> Vec<Placed> {
     let most = PERIODS.1.min(passes as f64 / 4.0);
     let steps = ((most - PERIODS.0) / PERIODS.2).floor();
     let scale = if let Scale::Linear(unit) = axis.covariate.scale { unit } else { 1.0 };
@@ -124,7 +124,7 @@ fn periods(axis: &Axis, passes: usize, [low, high]: [f64; 2]) -> Vec<Placed> {
 }
 
 /// What a pass before leaves: along its setting, counted from the mean; or the more the nearer its place was.
-fn remembered(axis: &Axis, part: &Problem) -> Vec<Placed> {
+fn remembered(axis: &ShapeAxis, part: &Problem) -> Vec<Placed> {
     let largest = part.design.largest_amplitude_m;
     let x: Vec<f64> = part.passes.iter().filter_map(|p| axis.of(p, largest)).collect();
     if axis.covariate.role == CovariateRole::Place {

@@ -6,7 +6,7 @@
 //! on friction (turning with the direction) or on the sensor. A rough function is many columns h at once.
 //! Each is also tried under other scatter (`ground`). docs/diagnosis/model.md, section 6.
 
-use super::axis::{Axis, Past};
+use super::axis::{Past, ShapeAxis};
 use super::factor::{Factor, factor, factor_of};
 use super::form::{Placement, ShapeForm, Way};
 use super::locations::placed;
@@ -81,7 +81,7 @@ impl Shape {
 /// Shapes of one kind over one axis: where each is, and the columns of each.
 struct Family {
     kind: ShapeKind,
-    axis: Axis,
+    axis: ShapeAxis,
     way: Way,
     at: Vec<f64>,
     forms: Vec<ShapeForm>,
@@ -250,7 +250,7 @@ mod tests {
         }
         let mut problem = Problem::new(&table, &rig(), &Default::default());
         let (_, _, scatter) =
-            crate::scatter::noise::settle(&table, &rig(), &mut problem, &crate::scatter::Belief::Judged);
+            crate::scatter::noise::settle(&table, &rig(), &mut problem, &crate::scatter::Belief::ByResidual);
         let fit = minimise(&problem, &[], &[0.0; NUISANCES], &problem.variance, 15);
         let basis = crate::regression::bases::Basis::none(problem.len());
         let (_, none) = crate::regression::evidence::averaged_over_form(&problem, &fit.u, &[], &basis);
@@ -312,7 +312,7 @@ mod tests {
         }
         let remembers_load = |table: &Table| {
             let past = Arc::new(Past::of(&table.passes));
-            let axes = Axis::histories(&table.passes, &past, table.design.largest_amplitude_m);
+            let axes = ShapeAxis::histories(&table.passes, &past, table.design.largest_amplitude_m);
             axes.iter().any(|axis| axis.covariate.name == "normal_force_n")
         };
         assert!(remembers_load(&random()) && !remembers_load(&rising));

@@ -26,15 +26,10 @@ pub struct Predictive {
 }
 
 /// The hypotheses that a decision leaves: the likeliest candidates, no gap and the open set. The leader comes first.
-pub fn predictives(
-    fitted: &Fitted,
-    rig: &RigFile,
-    decision: &Decision,
-    grid: &[Condition],
-) -> Vec<Predictive> {
+pub fn predictives(fitted: &Fitted, rig: &RigFile, decision: &Decision, at: &[Condition]) -> Vec<Predictive> {
     let k = &fitted.problem.constants;
-    let problem = fitted.problem.at(grid);
-    let basis = fitted.kernels.at(grid);
+    let problem = fitted.problem.at(at);
+    let basis = fitted.kernels.at(at);
     let mut order: Vec<usize> = (0..fitted.candidates.len()).collect();
     order.sort_by(|&a, &b| decision.probabilities[b].total_cmp(&decision.probabilities[a]).then(a.cmp(&b)));
     if let Some(leader) = decision.leader() {
@@ -52,14 +47,14 @@ pub fn predictives(
         of(c.names().join("+"), decision.probabilities[i], &c.best)
     };
     let mut list: Vec<Predictive> = order.into_par_iter().map(cause).collect();
-    list.push(of("no gap".to_string(), decision.none, &fitted.none));
+    list.push(of("no gap".to_string(), decision.no_gap, &fitted.baseline));
 
     let level: Vec<f64> = list[0].mean.iter().copied().collect();
-    let scatter = fitted.scatter_of_a_pass(&problem, rig, &fitted.none.u, &level);
+    let scatter = fitted.scatter_of_a_pass(&problem, rig, &fitted.baseline.u, &level);
     list.iter_mut().for_each(|belief| belief.scatter.clone_from(&scatter));
-    let (mean, covariance, white) = fitted.discrepancy.belief(&fitted.problem, grid);
+    let (mean, covariance, white) = fitted.discrepancy.belief(&fitted.problem, at);
     let scatter = scatter.iter().zip(&white).map(|(s, w)| s + w).collect();
-    let (name, probability) = ("unknown".to_string(), decision.unknown.max(k.design_least_probability));
+    let (name, probability) = ("unknown".to_string(), decision.open_set.max(k.design_least_probability));
     list.push(Predictive { name, probability, mean, covariance, scatter });
     list
 }

@@ -36,7 +36,7 @@ pub struct ResponseFit {
 }
 
 /// Edges with the stated mean delay of the channel.
-pub struct Problem<'a> {
+pub struct TimingRegression<'a> {
     /// The edges.
     pub edges: &'a [Prepared],
     /// Mean delay of the channel's filter as stated, s.
@@ -65,7 +65,7 @@ fn take_off(y: &mut [f64], unit: &[f64]) {
     y.iter_mut().zip(unit).for_each(|(a, b)| *a -= share * b);
 }
 
-impl Problem<'_> {
+impl TimingRegression<'_> {
     /// Residuals of each edge: its level, its size and a straight drift are its own.
     pub fn residuals(&self, form: ResponseForm, late_s: f64, stiffness: f64) -> Vec<Vec<f64>> {
         let one = |edge: &Prepared| {

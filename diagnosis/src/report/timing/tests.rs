@@ -1,6 +1,6 @@
 //! The estimator against closed forms and against another program's fit, without the virtual rig.
 
-use super::fit::Problem;
+use super::fit::TimingRegression;
 use super::response::Prepared;
 use super::*;
 use crate::random::deviate;
@@ -60,7 +60,7 @@ fn one_edge_is_fitted_as_scipy_fits_it() {
         0.2 - 0.1 * response(t, 8e-3) + noise
     });
     let edges = [Prepared::of(&one, &Straight).unwrap()];
-    let fit = Problem { edges: &edges, stated_s: 0.0 }.fit(ResponseForm::FirstOrder, false);
+    let fit = TimingRegression { edges: &edges, stated_s: 0.0 }.fit(ResponseForm::FirstOrder, false);
     println!("{fit:?}");
     assert!((fit.late_s - SCIPY[0]).abs() < 0.05 * SCIPY[1], "{fit:?}");
     let white = fit.sd_s * fit.counts.sqrt();
@@ -96,7 +96,7 @@ fn the_scatter_of_the_estimate_is_the_cramer_rao_bound() {
                 };
                 let edges: Vec<Edge> = (0..edges_of_a_run).map(one).collect();
                 let edges: Vec<Prepared> = edges.iter().filter_map(|e| Prepared::of(e, &Straight)).collect();
-                Problem { edges: &edges, stated_s: 0.0 }.fit(ResponseForm::FirstOrder, false)
+                TimingRegression { edges: &edges, stated_s: 0.0 }.fit(ResponseForm::FirstOrder, false)
             })
             .collect();
         let n = fits.len() as f64;

@@ -8,7 +8,7 @@ use crate::estimate::EstimateConfig;
 use crate::ports::{
     Amplifier, AmplifierState, ForceSensor, Forces, NoData, Quality, Sample, Stage, StageState,
 };
-use crate::safety::{Cause, Limits, Request};
+use crate::safety::{Limits, Request, TripCause};
 use models::{PeakToPeak, SpringSlider};
 use ringbuf::HeapRb;
 use ringbuf::traits::{Consumer, Observer, Split};
@@ -197,7 +197,7 @@ fn a_blocked_port_is_lateness_overruns_and_a_trip() {
     let before = running.rows.try_iter_last_cycle();
     let row = running.until("a trip", |row| row.tripped.is_some());
     let trip = row.tripped.unwrap();
-    assert!(matches!(trip.cause, Cause::Overrun | Cause::Suspended), "{trip:?}");
+    assert!(matches!(trip.cause, TripCause::Overrun | TripCause::Suspended), "{trip:?}");
     assert!(row.cycle <= before + 3, "cycle {} after {before}", row.cycle);
     assert!(row.drive_pp_m == 0.0 && row.inputs.seen.missed(PERIOD) >= 30);
     running.until("some more", |row| row.cycle > before + 10);
@@ -282,7 +282,7 @@ fn a_stop_is_off_within_two_cycles_however_full_the_queue() {
     while running.queue.push(Command::Set(driven, Marker::default())).is_ok() {}
     running.queue.stop();
     let row = running.until("the stop", |row| row.tripped.is_some());
-    assert_eq!(row.tripped.map(|t| t.cause), Some(Cause::Stopped));
+    assert_eq!(row.tripped.map(|t| t.cause), Some(TripCause::Stopped));
     assert!(row.inputs.commands[0] == Some(Command::Stop) && row.drive_pp_m == 0.0);
     assert!(row.cycle <= at + 3, "{} after {at}", row.cycle);
     let later = running.until("later", |later| later.cycle >= row.cycle + 20);
@@ -293,7 +293,7 @@ fn a_stop_is_off_within_two_cycles_however_full_the_queue() {
 /// Deadlines are counted once each, run or skipped.
 #[test]
 fn the_grid_counts_every_deadline_once() {
-    let mut grid = Grid { period: 10, due: 100 };
+    let mut grid = DeadlineGrid { period: 10, due: 100 };
     assert_eq!((grid.next(93), grid.begin(101)), (100, (1, 0)));
     // The turn ends at 145: deadlines 110 to 140 are past, the cycle begins at 150 and is late by 40.
     assert_eq!(grid.next(145), 150);

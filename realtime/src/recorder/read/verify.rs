@@ -8,7 +8,7 @@ use mcap::records::{Metadata, Record, op};
 use std::collections::VecDeque;
 
 /// What a sound record of the format comes to.
-pub(super) enum Verified {
+pub(super) enum Checked {
     Nothing,
     Entry(Entry),
     Chunk(VecDeque<Message>),
@@ -34,7 +34,7 @@ pub(super) fn may_begin(bytes: &[u8]) -> Option<u64> {
 }
 
 /// Checks a record of the format by all that vouches for it.
-pub(super) fn verify(opcode: u8, body: &[u8], wanted: Wanted) -> Result<Verified, String> {
+pub(super) fn verify(opcode: u8, body: &[u8], wanted: Wanted) -> Result<Checked, String> {
     if opcode == op::ATTACHMENT && !ends(body) {
         return Err("an attachment is shorter than its own head".into());
     }
@@ -43,14 +43,14 @@ pub(super) fn verify(opcode: u8, body: &[u8], wanted: Wanted) -> Result<Verified
         return Err("a record is longer than what it holds".into());
     }
     match record {
-        Record::Chunk { header, data } => chunk::messages(&header, &data, body, wanted).map(Verified::Chunk),
-        Record::MessageIndex(_) | Record::Header(_) => Ok(Verified::Nothing),
+        Record::Chunk { header, data } => chunk::messages(&header, &data, body, wanted).map(Checked::Chunk),
+        Record::MessageIndex(_) | Record::Header(_) => Ok(Checked::Nothing),
         Record::Attachment { header, data, crc } => {
             if crc == 0 {
                 return Err(format!("the attached file '{}' has no checksum", header.name));
             }
             let (name, time_ns, bytes) = (header.name, header.log_time, data.into_owned());
-            Ok(Verified::Entry(Entry::File { name, time_ns, bytes }))
+            Ok(Checked::Entry(Entry::File { name, time_ns, bytes }))
         }
         Record::Metadata(metadata) => {
             let (name, mut facts) = (metadata.name, metadata.metadata);
@@ -62,10 +62,10 @@ pub(super) fn verify(opcode: u8, body: &[u8], wanted: Wanted) -> Result<Verified
                 Some(stated) if stated != checksum_of(&name, &facts) => {
                     Err("the checksum of a metadata record does not agree".into())
                 }
-                Some(_) => Ok(Verified::Entry(Entry::Facts { name, facts })),
+                Some(_) => Ok(Checked::Entry(Entry::Facts { name, facts })),
             }
         }
-        Record::DataEnd(end) => Ok(Verified::DataEnd(end.data_section_crc)),
+        Record::DataEnd(end) => Ok(Checked::DataEnd(end.data_section_crc)),
         _ => Err("a record of the format is out of place".into()),
     }
 }

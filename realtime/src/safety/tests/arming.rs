@@ -31,7 +31,7 @@ impl Relayed {
         self.stuck.unwrap_or(command == Some(SupplyCommand::Cut))
     }
 
-    fn cycle(&mut self, spoil: impl FnOnce(&mut Observation), controls: Controls) -> Decision {
+    fn cycle(&mut self, spoil: impl FnOnce(&mut Observation), controls: Controls) -> SafetyDecision {
         let (cut, n) = (self.cut(), self.bench.n + 1);
         let taken_at = Nanos(u64::from(n) * T.0);
         let decision = self.bench.cycle(
@@ -84,7 +84,7 @@ fn a_disarmed_rig_keeps_its_supply_open_until_the_channel_is_proved() {
     assert_eq!(rig.arm(100), (None, true));
     let disarm = Controls { stop: true, open_supply: true, ..Controls::default() };
     let decision = rig.cycle(|_| {}, disarm);
-    assert_eq!(decision.tripped.map(|trip| trip.cause), Some(Cause::Stopped));
+    assert_eq!(decision.tripped.map(|trip| trip.cause), Some(TripCause::Stopped));
     for _ in 0..5000 {
         let decision = rig.cycle(|_| {}, Controls::default());
         assert_eq!((decision.supply, decision.drive.enable()), (SupplyCommand::Cut, false));
@@ -102,7 +102,7 @@ fn a_second_channel_that_does_not_act_keeps_the_rig_from_arming() {
         assert!(!armed);
         // One that stands open already is known without a proof; one that does not open is found by it.
         match trip {
-            Some(trip) => assert!(trip.cause == Cause::SupplySwitch && trip.value > 0.5, "{trip:?}"),
+            Some(trip) => assert!(trip.cause == TripCause::SupplySwitch && trip.value > 0.5, "{trip:?}"),
             None => assert!(stuck),
         }
     }
@@ -110,7 +110,7 @@ fn a_second_channel_that_does_not_act_keeps_the_rig_from_arming() {
     let mut rig = Relayed::new(0, None);
     rig.cycle(|s| s.supply = Err(NoData::Disconnected), Controls::default());
     let decision = rig.cycle(|s| s.supply = Err(NoData::Disconnected), RESET);
-    assert_eq!((decision.armed_now, decision.blocking), (false, Some(Cause::SupplySwitch)));
+    assert_eq!((decision.armed_now, decision.blocking), (false, Some(TripCause::SupplySwitch)));
 }
 
 /// A relay that sticks where its own proof has put it: the supply stays cut, and the rig is not armed.
@@ -129,7 +129,7 @@ fn a_second_channel_that_opens_and_does_not_close_again_keeps_the_rig_from_armin
         decision.tripped.map(|trip| (n, trip))
     });
     let (cycles, trip) = tripped.unwrap();
-    assert!(trip.cause == Cause::SupplySwitch && trip.bound == 0.5 && trip.value > 0.5, "{trip:?}");
+    assert!(trip.cause == TripCause::SupplySwitch && trip.bound == 0.5 && trip.value > 0.5, "{trip:?}");
     // 500 ms, and the cycles in which the cut was seen and the closing commanded.
     assert!((500..=504).contains(&cycles), "{cycles}");
     assert!(!rig.cycle(|_| {}, Controls::default()).drive.enable());
@@ -142,7 +142,7 @@ fn an_amplifier_that_does_not_come_back_is_a_trip_with_its_own_cause() {
     rig.cycle(|_| {}, RESET);
     let dead = |s: &mut Observation| s.amplifier = Err(NoData::Disconnected);
     let trip = (0..6000).find_map(|_| rig.cycle(dead, Controls::default()).tripped).unwrap();
-    assert_eq!((trip.cause, trip.bound), (Cause::AmplifierStale, 5.0));
+    assert_eq!((trip.cause, trip.bound), (TripCause::AmplifierStale, 5.0));
     // One that comes back switched on is cut again at once.
     let mut rig = Relayed::new(2, None);
     rig.cycle(|_| {}, Controls::default());
@@ -154,7 +154,7 @@ fn an_amplifier_that_does_not_come_back_is_a_trip_with_its_own_cause() {
     };
     let decision =
         (0..200).map(|_| rig.cycle(on, Controls::default())).find(|d| d.tripped.is_some()).unwrap();
-    assert_eq!(decision.tripped.unwrap().cause, Cause::RefusesOff);
+    assert_eq!(decision.tripped.unwrap().cause, TripCause::RefusesOff);
     assert!(is_cut(&decision));
 }
 
@@ -165,7 +165,7 @@ fn a_relay_that_falls_while_armed_trips() {
     rig.stuck = Some(true);
     let up = |s: &mut Observation| s.amplifier = healthy(0, &DriveCommand::off(0, T)).amplifier;
     let trip = (0..700).find_map(|_| rig.cycle(up, Controls::default()).tripped).unwrap();
-    assert!(matches!(trip.cause, Cause::SupplySwitch | Cause::AmplifierStale), "{trip:?}");
+    assert!(matches!(trip.cause, TripCause::SupplySwitch | TripCause::AmplifierStale), "{trip:?}");
     // A readback that grows old trips as well.
     let mut rig = Relayed::new(1, None);
     assert_eq!(rig.arm(100), (None, true));
@@ -177,7 +177,7 @@ fn a_relay_that_falls_while_armed_trips() {
             |s: &mut Observation| s.supply = Ok(SupplyState { cut: false, taken_at: old, sequence: 1 });
         trip = rig.cycle(stale, Controls::default()).tripped;
     }
-    assert_eq!((trip.map(|t| t.cause), cycles), (Some(Cause::SupplySwitch), 81));
+    assert_eq!((trip.map(|t| t.cause), cycles), (Some(TripCause::SupplySwitch), 81));
 }
 
 /// The refusal is answered by the relay, which stays open until a reset proves it anew.
@@ -223,7 +223,7 @@ fn an_amplifier_without_watchdog_needs_the_second_channel() {
     bench.limits.amplifier_watchdog = false;
     bench.cycle(|_| {}, Controls::default());
     let decision = bench.cycle(|_| {}, RESET);
-    assert_eq!((decision.armed_now, decision.blocking), (false, Some(Cause::Unguarded)));
+    assert_eq!((decision.armed_now, decision.blocking), (false, Some(TripCause::Unguarded)));
     let mut rig = Relayed::new(1, None);
     rig.bench.limits.amplifier_watchdog = false;
     assert_eq!(rig.arm(100), (None, true));
@@ -259,21 +259,21 @@ fn a_supply_cut_for_a_silent_board_before_arming_is_proved_and_the_fault_it_expl
     for n in 1..=100 {
         let decision = rig.cycle(|s| (closed(s, last), faulted_without_supply(s)).1, Controls::default());
         // 80 ms is its age limit.
-        assert_eq!(decision.waits_for, (n > 80).then_some(Cause::EmergencyStop), "{n}");
+        assert_eq!(decision.waits_for, (n > 80).then_some(TripCause::EmergencyStop), "{n}");
         assert_eq!(is_cut(&decision), n > 80);
     }
     for _ in 0..1000 {
         let decision = heard(&mut rig, Controls::default());
         assert!(is_cut(&decision) && !decision.armed_now);
-        assert_eq!((decision.blocking, decision.waits_for), (Some(Cause::AmplifierFault), None));
+        assert_eq!((decision.blocking, decision.waits_for), (Some(TripCause::AmplifierFault), None));
     }
     heard(&mut rig, RESET);
     assert!((0..100).any(|_| heard(&mut rig, Controls::default()).armed_now));
     // A fault that the supply does not explain is waited for, before the reset and in the proof.
     let mut rig = Relayed::new(3, None);
     let faulted = |s: &mut Observation| s.amplifier.as_mut().unwrap().fault = true;
-    assert_eq!(rig.cycle(faulted, Controls::default()).waits_for, Some(Cause::AmplifierFault));
-    assert_eq!(rig.cycle(faulted, RESET).waits_for, Some(Cause::AmplifierFault));
+    assert_eq!(rig.cycle(faulted, Controls::default()).waits_for, Some(TripCause::AmplifierFault));
+    assert_eq!(rig.cycle(faulted, RESET).waits_for, Some(TripCause::AmplifierFault));
     assert!(!rig.bench.safety.is_proving());
 }
 
@@ -288,7 +288,7 @@ fn a_supply_cut_for_a_pressed_stop_or_a_refusal_waits_for_a_person() {
             faulted_without_supply(s);
             s.amplifier.as_mut().unwrap().output_on = on;
         };
-        let cause = if pressed { Cause::EmergencyStop } else { Cause::RefusesOff };
+        let cause = if pressed { TripCause::EmergencyStop } else { TripCause::RefusesOff };
         let cut = (0..100).find(|_| {
             let decision = rig.cycle(|s| seen(s, !pressed, !pressed), Controls::default());
             assert!(!is_cut(&decision) || decision.waits_for == Some(cause));
@@ -317,8 +317,8 @@ fn an_open_supply_is_reported_as_the_relay_and_not_as_the_amplifier() {
     let mut rig = Relayed::new(0, Some(true));
     for _ in 0..600 {
         let decision = rig.cycle(faulted_without_supply, Controls::default());
-        assert_eq!(decision.blocking, Some(Cause::AmplifierFault));
-        assert_eq!(decision.waits_for, Some(Cause::SupplySwitch));
+        assert_eq!(decision.blocking, Some(TripCause::AmplifierFault));
+        assert_eq!(decision.waits_for, Some(TripCause::SupplySwitch));
     }
     // Closed again in the proof, the amplifier is what is waited for.
     let mut rig = Relayed::new(2, None);
@@ -331,7 +331,7 @@ fn an_open_supply_is_reported_as_the_relay_and_not_as_the_amplifier() {
         (state.fault, state.taken_at) = (true, taken_at);
     };
     let waits: Vec<_> = (0..12).map(|_| rig.cycle(faulted, Controls::default()).waits_for).collect();
-    assert_eq!((waits[0], waits[11]), (None, Some(Cause::AmplifierFault)), "{waits:?}");
+    assert_eq!((waits[0], waits[11]), (None, Some(TripCause::AmplifierFault)), "{waits:?}");
     assert!(rig.bench.safety.is_proving());
 }
 
@@ -342,7 +342,7 @@ fn missed_deadlines_that_would_trip_the_armed_rig_are_waited_for() {
     let late = |s: &mut Observation| s.lateness = Nanos(11 * T.0);
     bench.cycle(late, Controls::default());
     let waited =
-        (1..2000).find(|_| bench.cycle(|_| {}, Controls::default()).waits_for != Some(Cause::Overrun));
+        (1..2000).find(|_| bench.cycle(|_| {}, Controls::default()).waits_for != Some(TripCause::Overrun));
     // A thousand cycles in buckets of a hundred, the first of which holds the stall.
     assert_eq!(waited, Some(1000));
     bench.cycle(|_| {}, RESET);

@@ -26,15 +26,15 @@ fn the_measured_amplitude_is_held_to_what_was_commanded() {
     let w = 2e-6;
     for (value, cause) in [
         (1.3 * w + 0.3e-6, None),
-        (1.3 * w + 0.301e-6, Some(Cause::AmplitudeRunaway)),
+        (1.3 * w + 0.301e-6, Some(TripCause::AmplitudeRunaway)),
         (0.2 * w, None),
-        (0.2 * w * (1.0 - 1e-12), Some(Cause::DriveNoResponse)),
-        (-0.3e-6, Some(Cause::DriveNoResponse)),
-        (-0.3001e-6, Some(Cause::AmplifierFault)),
+        (0.2 * w * (1.0 - 1e-12), Some(TripCause::DriveNoResponse)),
+        (-0.3e-6, Some(TripCause::DriveNoResponse)),
+        (-0.3001e-6, Some(TripCause::AmplifierFault)),
     ] {
         let trip = trips(&mut bench(), 3, |s| *measured(s) = value);
         assert_eq!(trip.map(|t| t.cause), cause, "{value}");
-        if let Some(trip) = trip.filter(|t| t.cause != Cause::AmplifierFault) {
+        if let Some(trip) = trip.filter(|t| t.cause != TripCause::AmplifierFault) {
             let bound = if value > w { 1.3 * w + 0.3e-6 } else { 0.2 * w };
             assert!((trip.value - value).abs() < 1e-15 && (trip.bound - bound).abs() < 1e-15, "{trip:?}");
         }
@@ -58,8 +58,8 @@ fn the_measured_amplitude_is_held_to_what_was_commanded() {
         });
         trip.map(|t| (t.cause, t.value))
     };
-    assert_eq!(saturated(50e-6), Some((Cause::OverAmplitude, 50e-6)));
-    assert_eq!(saturated(2e-6), Some((Cause::AmplitudeSaturated, 2.0)));
+    assert_eq!(saturated(50e-6), Some((TripCause::OverAmplitude, 50e-6)));
+    assert_eq!(saturated(2e-6), Some((TripCause::AmplitudeSaturated, 2.0)));
 }
 
 /// The echo: 2 % and 5 nm, 1 Hz and 1e-4, either way.
@@ -79,7 +79,7 @@ fn the_echo_is_held_to_what_was_sent() {
             amplifier(s).echoed_amplitude = PeakToPeak::from_metres(2e-6 + off_m);
             amplifier(s).echoed_frequency_hz = 27_500.0 + off_hz;
         });
-        assert_eq!(got.map(|t| t.cause), trip.then_some(Cause::EchoMismatch), "{off_m} {off_hz}");
+        assert_eq!(got.map(|t| t.cause), trip.then_some(TripCause::EchoMismatch), "{off_m} {off_hz}");
         if let Some(trip) = got {
             let (shown, commanded) =
                 if off_hz == 0.0 { (2e-6 + off_m, 2e-6) } else { (27_500.0 + off_hz, 27_500.0) };
@@ -91,7 +91,7 @@ fn the_echo_is_held_to_what_was_sent() {
         amplifier(s).output_on = false;
         amplifier(s).amplitude = Err(NoData::NotFitted);
     });
-    assert_eq!(switched.map(|t| (t.cause, t.unit)), Some((Cause::EchoMismatch, Unit::Flag)));
+    assert_eq!(switched.map(|t| (t.cause, t.unit)), Some((TripCause::EchoMismatch, Unit::Flag)));
     // Off, nothing is expected of it.
     let mut off = bench();
     off.request.amplitude = PeakToPeak::ZERO;
@@ -120,7 +120,7 @@ fn requests_up_to_each_limit_are_granted() {
             let decision = bench.cycle(|_| {}, Controls::default());
             assert_eq!(
                 decision.tripped.map(|t| (t.cause, t.bound)),
-                bound.map(|b| (Cause::RequestRefused, b))
+                bound.map(|b| (TripCause::RequestRefused, b))
             );
             if bound.is_none() {
                 assert_eq!(decision.stage.velocity_m_s(), bench.request.velocity_m_s);
@@ -133,7 +133,7 @@ fn requests_up_to_each_limit_are_granted() {
     lax.limits.amplitude_max = PeakToPeak::from_metres(1.0);
     lax.request.amplitude = PeakToPeak::from_metres(10.1e-6);
     let trip = lax.cycle(|_| {}, Controls::default()).tripped.unwrap();
-    assert_eq!((trip.cause, trip.bound), (Cause::RequestRefused, HARD.amplitude_max.metres()));
+    assert_eq!((trip.cause, trip.bound), (TripCause::RequestRefused, HARD.amplitude_max.metres()));
     // Without vibration the frequency does not matter.
     let mut still = bench();
     still.request = Request { frequency_hz: 1.0, ..Request::default() };
@@ -160,7 +160,7 @@ fn the_way_back_leads_to_the_middle_of_the_travel() {
         let trip = trips(&mut bench, 1, |s| (stage(s).position_m, stage(s).at_limit) = (position, true));
         assert_eq!(
             trip.map(|t| (t.cause, t.bound)),
-            end.map(|e| (Cause::OverTravel, e)),
+            end.map(|e| (TripCause::OverTravel, e)),
             "{position} {velocity}"
         );
     }
@@ -176,11 +176,11 @@ fn a_temperature_is_asked_for_only_where_it_is_fitted() {
     bench.limits.temperature_fitted = true;
     assert_eq!(
         trips(&mut bench, 1, lost).map(|t| (t.cause, t.value)),
-        Some((Cause::OverTemperature, f64::INFINITY))
+        Some((TripCause::OverTemperature, f64::INFINITY))
     );
     let mut none = super::bounds::bench();
     let trip = trips(&mut none, 1, |s| amplifier(s).temperature_c.as_mut().unwrap().value = f64::NAN);
-    assert_eq!(trip.map(|t| t.cause), Some(Cause::OverTemperature));
+    assert_eq!(trip.map(|t| t.cause), Some(TripCause::OverTemperature));
 }
 
 /// A step of the force that is no spike yet, and one that is; a value too small for a normal number is none.
@@ -222,8 +222,8 @@ fn a_rate_is_a_difference_over_a_time() {
     let limit = 0.0625 / T.seconds();
     assert_eq!(climb(0.0625, limit, false), None);
     let trip = climb(0.0625, limit * (1.0 - 1e-9), false).unwrap();
-    assert_eq!((trip.cause, trip.value, trip.bound), (Cause::ForceRate, limit, limit * (1.0 - 1e-9)));
-    assert_eq!(climb(-0.0625, limit * (1.0 - 1e-9), false).map(|t| t.cause), Some(Cause::ForceRate));
+    assert_eq!((trip.cause, trip.value, trip.bound), (TripCause::ForceRate, limit, limit * (1.0 - 1e-9)));
+    assert_eq!(climb(-0.0625, limit * (1.0 - 1e-9), false).map(|t| t.cause), Some(TripCause::ForceRate));
     assert_eq!(climb(0.0625, limit * 0.5, true), None, "one stamp is no time");
     // Fast, slow, fast: two in a row are needed.
     let mut bench = Bench::armed();
@@ -255,7 +255,7 @@ fn an_amplitude_rate_is_a_difference_over_a_time() {
         })
     };
     let trip = climb(20.1e-9, false, false).unwrap();
-    assert!(trip.cause == Cause::AmplitudeRate && (trip.value - 20.1e-6).abs() < 1e-9, "{trip:?}");
+    assert!(trip.cause == TripCause::AmplitudeRate && (trip.value - 20.1e-6).abs() < 1e-9, "{trip:?}");
     assert_eq!(climb(20.1e-9, true, false), None, "one stamp is no time");
     // At the limit itself: values, and their differences, that are exact in binary.
     let step = 2f64.powi(-26);
@@ -268,7 +268,7 @@ fn an_amplitude_rate_is_a_difference_over_a_time() {
     };
     assert_eq!(trips(&mut exact, 8, climb_by), None);
     exact.limits.amplitude_rate_max_m_s *= 1.0 - 1e-12;
-    assert_eq!(trips(&mut exact, 8, climb_by).map(|t| t.cause), Some(Cause::AmplitudeRate));
+    assert_eq!(trips(&mut exact, 8, climb_by).map(|t| t.cause), Some(TripCause::AmplitudeRate));
     assert_eq!(climb(20.1e-9, false, true), None, "the same count is the same sample");
     assert_eq!(climb(-25e-9, false, false), None, "falling is not rising");
     // Fast, slow, fast: two in a row are needed.
@@ -308,9 +308,9 @@ fn lost_samples_are_counted_in_whole_windows() {
         }
         (remark, None)
     };
-    let channels: [(Pick, Remark, Cause); 2] = [
-        (lateral, Remark::LateralLossy, Cause::LateralLossy),
-        (normal, Remark::NormalLossy, Cause::NormalLossy),
+    let channels: [(Pick, Remark, TripCause); 2] = [
+        (lateral, Remark::LateralLossy, TripCause::LateralLossy),
+        (normal, Remark::NormalLossy, TripCause::NormalLossy),
     ];
     for (channel, remark, cause) in channels {
         assert_eq!(lose(channel, 85), (None, None));
@@ -383,23 +383,23 @@ fn limits_bind_exactly_where_they_say() {
     type Spoil = fn(&mut Observation, f64);
     let l = limits();
     let amplitude: Spoil = |s, v| amplifier(s).amplitude.as_mut().unwrap().value = v;
-    let cases: &[(Cause, f64, f64, Spoil)] = &[
-        (Cause::NormalOverforce, l.normal_force_max_n, 1e-6, |s, v| normal(s).value = v),
-        (Cause::LateralOverforce, l.lateral_force_max_n, 1e-6, |s, v| lateral(s).value = v),
-        (Cause::LateralOverforce, -l.lateral_force_max_n, -1e-6, |s, v| lateral(s).value = v),
-        (Cause::OverAmplitude, l.amplitude_max.metres(), 1e-12, amplitude),
-        (Cause::OverTemperature, l.temperature_max_c, 1e-6, |s, v| {
+    let cases: &[(TripCause, f64, f64, Spoil)] = &[
+        (TripCause::NormalOverforce, l.normal_force_max_n, 1e-6, |s, v| normal(s).value = v),
+        (TripCause::LateralOverforce, l.lateral_force_max_n, 1e-6, |s, v| lateral(s).value = v),
+        (TripCause::LateralOverforce, -l.lateral_force_max_n, -1e-6, |s, v| lateral(s).value = v),
+        (TripCause::OverAmplitude, l.amplitude_max.metres(), 1e-12, amplitude),
+        (TripCause::OverTemperature, l.temperature_max_c, 1e-6, |s, v| {
             amplifier(s).temperature_c.as_mut().unwrap().value = v;
         }),
-        (Cause::OverTravel, l.travel_m.1, 1e-9, |s, v| stage(s).position_m = v),
-        (Cause::OverTravel, l.travel_m.0, -1e-9, |s, v| stage(s).position_m = v),
-        (Cause::Suspended, 50.0, 0.001, |s, v| s.lateness = Nanos((v * T.0 as f64) as u64)),
+        (TripCause::OverTravel, l.travel_m.1, 1e-9, |s, v| stage(s).position_m = v),
+        (TripCause::OverTravel, l.travel_m.0, -1e-9, |s, v| stage(s).position_m = v),
+        (TripCause::Suspended, 50.0, 0.001, |s, v| s.lateness = Nanos((v * T.0 as f64) as u64)),
     ];
     for (cause, bound, above, spoil) in cases {
         let mut bench = Bench::armed();
         // At rest in the middle, so that a position beyond the travel is not on its way back.
         bench.request.velocity_m_s = 0.0;
-        if *cause == Cause::OverAmplitude {
+        if *cause == TripCause::OverAmplitude {
             bench.request.amplitude = l.amplitude_max;
         }
         for _ in 0..60 {
@@ -411,7 +411,7 @@ fn limits_bind_exactly_where_they_say() {
         // A jump to the bound is confirmed by its second sample; the rate rule is out of the way.
         bench.limits.force_rate_max_n_s = 1e9;
         for i in 0..5 {
-            let late = *cause == Cause::Suspended && i > 0;
+            let late = *cause == TripCause::Suspended && i > 0;
             let decision = bench.cycle(
                 |s| {
                     if !late {
@@ -574,7 +574,7 @@ fn saturation_that_comes_and_goes_trips() {
             normal(s).quality = Quality::Saturated;
         }
     });
-    assert_eq!((cause, cycles), (Cause::NormalSaturated, 10));
+    assert_eq!((cause, cycles), (TripCause::NormalSaturated, 10));
     // Four in fifty cycles, alone each, are let through.
     let mut bench = super::bounds::bench();
     for i in 0..400 {
@@ -596,13 +596,13 @@ fn an_overforce_trips_whatever_the_counter_says() {
         normal(s).sequence = n0;
         normal(s).value = 40.0;
     });
-    assert_eq!((cause, cycles), (Cause::NormalOverforce, 3));
+    assert_eq!((cause, cycles), (TripCause::NormalOverforce, 3));
     let mut railed = bench();
     let (cause, cycles) = railed.until_off(|s| {
         normal(s).value = 40.0;
         normal(s).quality = Quality::Saturated;
     });
-    assert_eq!((cause, cycles), (Cause::NormalSaturated, 2));
+    assert_eq!((cause, cycles), (TripCause::NormalSaturated, 2));
 }
 
 /// Near its load, or near zero when lifted off; less than the load is a lost contact, not a fault.
@@ -622,7 +622,7 @@ fn the_normal_force_is_held_to_the_load() {
         (0.0, 0.301, false),
         (0.0, -0.301, false),
     ] {
-        let bound = (Cause::LoadImplausible, 1.5 * load + 0.3);
+        let bound = (TripCause::LoadImplausible, 1.5 * load + 0.3);
         assert_eq!(trip_of(load, shows, true), (!fits).then_some(bound), "{load} N, {shows} N");
         assert_eq!(trip_of(load, shows, false), None, "weights load this finger");
     }
@@ -640,7 +640,7 @@ fn an_amplitude_that_repeats_itself_is_frozen() {
         trips(&mut bench, 400, |s| amplifier(s).amplitude.as_mut().unwrap().raw = 77)
             .map(|t| (t.cause, t.bound))
     };
-    assert_eq!(frozen(Some(200), true), Some((Cause::AmplitudeFrozen, 200.0)));
+    assert_eq!(frozen(Some(200), true), Some((TripCause::AmplitudeFrozen, 200.0)));
     assert_eq!(frozen(Some(200), false), None, "at rest it has nothing to tell");
     assert_eq!(frozen(None, true), None, "a readback without noise");
 }

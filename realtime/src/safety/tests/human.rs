@@ -19,7 +19,7 @@ impl Guarded {
         Guarded { bench, held: false, pressed: false, open: false, cut: false }
     }
 
-    fn cycle(&mut self, spoil: impl FnOnce(&mut Observation), controls: Controls) -> Decision {
+    fn cycle(&mut self, spoil: impl FnOnce(&mut Observation), controls: Controls) -> SafetyDecision {
         let n = self.bench.n + 1;
         let taken_at = Nanos(u64::from(n) * T.0);
         let contact = |closed| Ok(SafetyContact { closed, taken_at, sequence: n });
@@ -71,7 +71,7 @@ fn a_hand_must_let_go_and_grip_again_before_every_arming() {
     rig.held = true;
     rig.cycle(|_| {}, Controls::default());
     assert!(!rig.reset());
-    assert_eq!(rig.cycle(|_| {}, Controls::default()).blocking, Some(Cause::DeadMan));
+    assert_eq!(rig.cycle(|_| {}, Controls::default()).blocking, Some(TripCause::DeadMan));
     let mut rig = Guarded::driving();
     rig.cycle(|_| {}, Controls { stop: true, ..Controls::default() });
     assert!(!rig.reset(), "held all the time: nobody confirmed");
@@ -84,10 +84,10 @@ fn a_hand_must_let_go_and_grip_again_before_every_arming() {
 #[test]
 fn letting_go_pressing_stop_and_opening_the_guard_switch_off_at_once() {
     type Act = fn(&mut Guarded);
-    let acts: [(Act, Cause); 3] = [
-        (|r| r.held = false, Cause::DeadMan),
-        (|r| r.pressed = true, Cause::EmergencyStop),
-        (|r| r.open = true, Cause::Interlock),
+    let acts: [(Act, TripCause); 3] = [
+        (|r| r.held = false, TripCause::DeadMan),
+        (|r| r.pressed = true, TripCause::EmergencyStop),
+        (|r| r.open = true, TripCause::Interlock),
     ];
     for (act, cause) in acts {
         let mut rig = Guarded::driving();
@@ -96,17 +96,17 @@ fn letting_go_pressing_stop_and_opening_the_guard_switch_off_at_once() {
         assert_eq!(decision.tripped.map(|t| t.cause), Some(cause));
         assert!(!decision.drive.enable());
         // The emergency stop is the one that takes the supply away.
-        assert_eq!(is_cut(&decision), cause == Cause::EmergencyStop);
+        assert_eq!(is_cut(&decision), cause == TripCause::EmergencyStop);
     }
 }
 
 #[test]
 fn a_contact_of_which_nothing_is_known_is_open() {
     type Pick = fn(&mut Observation) -> &mut Result<SafetyContact, NoData>;
-    let picks: [(Pick, Cause); 3] = [
-        (|s| &mut s.contacts.dead_man, Cause::DeadMan),
-        (|s| &mut s.contacts.emergency_stop, Cause::EmergencyStop),
-        (|s| &mut s.contacts.interlock, Cause::Interlock),
+    let picks: [(Pick, TripCause); 3] = [
+        (|s| &mut s.contacts.dead_man, TripCause::DeadMan),
+        (|s| &mut s.contacts.emergency_stop, TripCause::EmergencyStop),
+        (|s| &mut s.contacts.interlock, TripCause::Interlock),
     ];
     for (pick, cause) in picks {
         for reason in [NoData::Disconnected, NoData::NeverRead, NoData::Corrupt] {
@@ -128,10 +128,10 @@ fn a_contact_of_which_nothing_is_known_is_open() {
 #[test]
 fn what_grew_old_while_the_loop_stood_still_is_not_to_blame() {
     type Act = fn(&mut Guarded);
-    let acts: [(Act, Cause); 3] = [
-        (|_| {}, Cause::Suspended),
-        (|r| r.pressed = true, Cause::EmergencyStop),
-        (|r| r.open = true, Cause::Interlock),
+    let acts: [(Act, TripCause); 3] = [
+        (|_| {}, TripCause::Suspended),
+        (|r| r.pressed = true, TripCause::EmergencyStop),
+        (|r| r.open = true, TripCause::Interlock),
     ];
     for (act, cause) in acts {
         let mut rig = Guarded::driving();
@@ -144,7 +144,7 @@ fn what_grew_old_while_the_loop_stood_still_is_not_to_blame() {
         assert!(is_cut(&decision) && !decision.drive.enable(), "{cause:?}");
     }
     let stop = Controls { stop: true, ..Controls::default() };
-    assert_eq!(Guarded::driving().cycle(suspended, stop).tripped.map(|t| t.cause), Some(Cause::Stopped));
+    assert_eq!(Guarded::driving().cycle(suspended, stop).tripped.map(|t| t.cause), Some(TripCause::Stopped));
 }
 
 fn suspended(seen: &mut Observation) {
@@ -173,9 +173,9 @@ fn a_human_finger_is_refused_where_anything_is_missing() {
         let mut rig = Guarded::driving();
         let trip = rig.cycle(spoil, Controls::default()).tripped.unwrap();
         match trip.cause {
-            Cause::Unguarded => assert_eq!(trip.value, which),
+            TripCause::Unguarded => assert_eq!(trip.value, which),
             // A dead-man device that is not there is not held either.
-            cause => assert_eq!((cause, which), (Cause::DeadMan, 4.0)),
+            cause => assert_eq!((cause, which), (TripCause::DeadMan, 4.0)),
         }
     }
     // A relay that the same program switches is no watchdog: one must be at the amplifier or at the relay itself.
@@ -183,7 +183,7 @@ fn a_human_finger_is_refused_where_anything_is_missing() {
         let mut rig = Guarded::driving();
         (rig.bench.limits.amplifier_watchdog, rig.bench.limits.supply_watchdog) = (amplifier, supply);
         let tripped = rig.cycle(|_| {}, Controls::default()).tripped.map(|trip| (trip.cause, trip.value));
-        assert_eq!(tripped, (!amplifier && !supply).then_some((Cause::Unguarded, 5.0)));
+        assert_eq!(tripped, (!amplifier && !supply).then_some((TripCause::Unguarded, 5.0)));
     }
     // An interlock that is not fitted is not missed.
     let mut rig = Guarded::driving();
@@ -205,11 +205,11 @@ fn a_key_stands_for_a_dead_man_device_only_where_the_limits_say_so() {
     let mut rig = Guarded::driving();
     (rig.bench.limits.dead_man_key, rig.held) = (true, false);
     let key = Controls { dead_man: true, ..Controls::default() };
-    assert_eq!(rig.cycle(|_| {}, key).tripped.map(|t| t.cause), Some(Cause::DeadMan));
+    assert_eq!(rig.cycle(|_| {}, key).tripped.map(|t| t.cause), Some(TripCause::DeadMan));
 }
 
 /// Driven and resting by turns; the cause and the time driven in s at the trip.
-fn driven(on: u32, off: u32, cycles: u32, change: fn(&mut Limits)) -> Option<(Cause, f64)> {
+fn driven(on: u32, off: u32, cycles: u32, change: fn(&mut Limits)) -> Option<(TripCause, f64)> {
     let mut rig = Guarded::driving();
     change(&mut rig.bench.limits);
     let w = rig.bench.request.amplitude;
@@ -234,7 +234,7 @@ fn no_pause_shorter_than_a_rest_ends_a_go() {
     };
     for off in [0, 1, 50, 500] {
         let (cause, time) = driven(100, off, 60_000, short).unwrap();
-        assert_eq!(cause, Cause::Exposure, "{off}");
+        assert_eq!(cause, TripCause::Exposure, "{off}");
         assert!((1.99..2.05).contains(&time), "{off}: {time} s");
     }
     // A rest of full length does.
@@ -245,12 +245,15 @@ fn no_pause_shorter_than_a_rest_ends_a_go() {
 fn the_hour_has_a_share_and_a_dose() {
     let duty: fn(&mut Limits) = |l| (l.exposure_max_s, l.exposure_duty_max) = (600.0, 1e-3);
     let (cause, time) = driven(700, 1, 10_000, duty).unwrap();
-    assert!(cause == Cause::ExposureDuty && (3.6..3.62).contains(&time), "{cause:?} {time}");
+    assert!(cause == TripCause::ExposureDuty && (3.6..3.62).contains(&time), "{cause:?} {time}");
     // 2 um at 27.5 kHz: (pi f w)^2 / 2 = 0.01493 m2/s2.
     let dose: fn(&mut Limits) = |l| (l.exposure_max_s, l.exposure_dose_max_m2_s) = (600.0, 0.03);
     let (cause, time) = driven(700, 1, 10_000, dose).unwrap();
     let expected = 0.03 / (0.5 * (std::f64::consts::PI * 27_500.0 * 2e-6f64).powi(2));
-    assert!(cause == Cause::ExposureDose && (time - expected).abs() < 0.02, "{cause:?} {time} {expected}");
+    assert!(
+        cause == TripCause::ExposureDose && (time - expected).abs() < 0.02,
+        "{cause:?} {time} {expected}"
+    );
     // Nobody's finger: nothing is counted against it.
     let nobody: fn(&mut Limits) = |l| {
         (l.exposure_max_s, l.exposure_dose_max_m2_s, l.exposure_duty_max) = (0.1, 1e-3, 1e-3);
@@ -319,8 +322,8 @@ fn what_earlier_runs_did_is_carried_over() {
     past.parts[2] = (Nanos(1801 * second), 0.0);
     rig.bench.safety.carry(&past);
     let decision = rig.cycle(|_| {}, Controls::default());
-    assert!(matches!(decision.blocking, Some(Cause::DeadMan)), "{:?}", decision.blocking);
+    assert!(matches!(decision.blocking, Some(TripCause::DeadMan)), "{:?}", decision.blocking);
     rig.held = true;
     let decision = rig.cycle(|_| {}, Controls::default());
-    assert_eq!(decision.blocking, Some(Cause::ExposureDuty));
+    assert_eq!(decision.blocking, Some(TripCause::ExposureDuty));
 }

@@ -29,7 +29,7 @@ fn a_new_set_point_has_its_response_time() {
             amplifier(s).echoed_amplitude = before.echoed_amplitude;
             amplifier(s).echoed_frequency_hz = before.echoed_frequency_hz;
         });
-        assert_eq!((cause, cycles), (Cause::EchoMismatch, 33));
+        assert_eq!((cause, cycles), (TripCause::EchoMismatch, 33));
     }
     // A plate that does not follow from rest: remarked and refused in the same cycle.
     let mut bench = whole_cycles();
@@ -40,7 +40,7 @@ fn a_new_set_point_has_its_response_time() {
     bench.request.amplitude = PeakToPeak::from_metres(2e-6);
     bench.cycle(|_| {}, Controls::default());
     let (cause, cycles) = bench.until_off(|s| amplifier(s).amplitude.as_mut().unwrap().value = 0.0);
-    assert_eq!((cause, cycles), (Cause::DriveNoResponse, 33));
+    assert_eq!((cause, cycles), (TripCause::DriveNoResponse, 33));
     let mut bench = whole_cycles();
     bench.request.amplitude = PeakToPeak::from_metres(4e-6);
     bench.cycle(|_| {}, Controls::default());
@@ -61,7 +61,7 @@ fn a_plate_may_ring_down_with_its_time_constant_and_no_slower() {
         bench.cycle(|_| {}, Controls::default());
         let (cause, cycles) = bench.until_off(|s| amplifier(s).amplitude.as_mut().unwrap().value = 2e-6);
         let down: f64 = ring_cycles * f64::ln(1.3 * 2e-6 / (2e-6 - 0.3e-6));
-        assert_eq!((cause, cycles), (Cause::AmplitudeRunaway, 11 + down.ceil() as u32), "{ring_cycles}");
+        assert_eq!((cause, cycles), (TripCause::AmplitudeRunaway, 11 + down.ceil() as u32), "{ring_cycles}");
     }
 }
 
@@ -77,7 +77,11 @@ fn a_stage_may_slow_down_with_its_response_time_and_no_slower() {
     bench.cycle(|s| stage(s).velocity_m_s = 0.25, Controls::default());
     let (cause, cycles) = bench.until_off(|s| stage(s).velocity_m_s = 0.25);
     let fade: f64 = 300.0 * (1.5 * 0.25 / (0.25 - 0.02_f64)).ln();
-    assert_eq!((cause, cycles), (Cause::StageNotFollowing, fade.ceil() as u32 + 1), "two states in a row");
+    assert_eq!(
+        (cause, cycles),
+        (TripCause::StageNotFollowing, fade.ceil() as u32 + 1),
+        "two states in a row"
+    );
     // Exactly half as fast again and 20 mm/s is let through; a state that is not new is not judged again.
     let mut bench = Bench::armed();
     for _ in 0..100 {
@@ -98,7 +102,7 @@ fn a_stage_owes_a_fifth_of_the_slowest_commanded_speed() {
     let mut bench = Bench::armed();
     bench.request.velocity_m_s = -1.5e-3;
     let (cause, cycles) = bench.until_off(|s| stage(s).velocity_m_s = 0.0);
-    assert_eq!((cause, cycles), (Cause::StageNotFollowing, 311));
+    assert_eq!((cause, cycles), (TripCause::StageNotFollowing, 311));
     // 100 mm/s is commanded, then 10: a fifth of the slower one will do; a faster one restarts no time.
     let mut bench = Bench::armed();
     for velocity in [0.1, 0.01, 0.1] {
@@ -116,7 +120,7 @@ fn a_stage_owes_a_fifth_of_the_slowest_commanded_speed() {
         assert_eq!(bench.cycle(|s| stage(s).velocity_m_s = 0.0, Controls::default()).tripped, None);
     }
     bench.request.velocity_m_s = 0.02;
-    assert_eq!(bench.until_off(|s| stage(s).velocity_m_s = 0.0), (Cause::StageNotFollowing, 311));
+    assert_eq!(bench.until_off(|s| stage(s).velocity_m_s = 0.0), (TripCause::StageNotFollowing, 311));
 }
 
 /// What a trip of this rule reports, and the fifth itself, which will do.
@@ -130,8 +134,8 @@ fn a_stage_that_does_not_follow_is_reported_with_its_bound() {
         })
     };
     assert_eq!(trip(0.2), None);
-    assert_eq!(trip(0.1), Some((Cause::StageNotFollowing, 0.1 * 0.02, 0.2 * 0.02)));
-    assert_eq!(trip(10.0), Some((Cause::StageNotFollowing, 10.0 * 0.02, 1.5 * 0.02 + 0.02)));
+    assert_eq!(trip(0.1), Some((TripCause::StageNotFollowing, 0.1 * 0.02, 0.2 * 0.02)));
+    assert_eq!(trip(10.0), Some((TripCause::StageNotFollowing, 10.0 * 0.02, 1.5 * 0.02 + 0.02)));
 }
 
 /// Off, and still on after its age and ten cycles: cut.
@@ -162,7 +166,7 @@ fn the_supply_is_cut_to_the_cycle() {
 #[test]
 fn a_frozen_channel_is_known_by_its_fiftieth_repeat() {
     let mut bench = Bench::armed();
-    assert_eq!(bench.until_off(|s| lateral(s).raw = 77), (Cause::LateralFrozen, 51));
+    assert_eq!(bench.until_off(|s| lateral(s).raw = 77), (TripCause::LateralFrozen, 51));
     let mut bench = Bench::armed();
     for i in 0..300 {
         let thaws = i % 50 == 49;
@@ -183,7 +187,7 @@ fn spikes_are_counted_over_fifty_cycles() {
             assert_eq!(decision.normal_usable, !spike);
             decision.tripped.map(|t| (t.cause, t.value, i))
         });
-        assert_eq!(tripped, trips.then_some((Cause::Noisy, 5.0, last)));
+        assert_eq!(tripped, trips.then_some((TripCause::Noisy, 5.0, last)));
     }
 }
 
@@ -205,7 +209,10 @@ fn a_row_of_samples_that_cannot_be_believed_is_three_long() {
                     last = s.forces.lateral;
                 }
             };
-            bench.cycle(play, Controls::default()).tripped.is_some_and(|t| t.cause == Cause::LateralInvalid)
+            bench
+                .cycle(play, Controls::default())
+                .tripped
+                .is_some_and(|t| t.cause == TripCause::LateralInvalid)
         })
     };
     // Each script on its own bench; the place of the trip.
@@ -236,7 +243,7 @@ fn a_repeated_sample_is_used_as_long_as_it_is_fresh() {
     let decision = bench.cycle(|s| s.forces.normal = last, Controls::default());
     assert_eq!(
         (decision.normal_usable, decision.tripped.map(|t| t.cause)),
-        (false, Some(Cause::NormalStale))
+        (false, Some(TripCause::NormalStale))
     );
     let mut bench = Bench::armed();
     let mut spike = healthy(bench.n, &bench.last).forces.normal;
@@ -266,11 +273,11 @@ fn a_stamp_may_be_ahead_by_its_age_limit() {
         let mut bench = Bench::armed();
         let decision =
             bench.cycle(|s| amplifier(s).taken_at.0 += l.amplifier.age_limit().0 + more, Controls::default());
-        assert_eq!(decision.tripped.map(|t| t.cause), trips.then_some(Cause::AmplifierStale));
+        assert_eq!(decision.tripped.map(|t| t.cause), trips.then_some(TripCause::AmplifierStale));
         let mut bench = Bench::armed();
         let decision =
             bench.cycle(|s| stage(s).taken_at.0 += l.stage.age_limit().0 + more, Controls::default());
-        assert_eq!(decision.tripped.map(|t| t.cause), trips.then_some(Cause::StageStale));
+        assert_eq!(decision.tripped.map(|t| t.cause), trips.then_some(TripCause::StageStale));
     }
 }
 
@@ -290,7 +297,7 @@ fn a_stage_is_given_its_time_and_a_fifth_of_its_speed() {
         let mut bench = Bench::armed();
         bench.request.velocity_m_s = velocity;
         let (cause, cycles) = bench.until_off(|s| stage(s).velocity_m_s = share * velocity);
-        assert_eq!(cause, Cause::StageNotFollowing);
+        assert_eq!(cause, TripCause::StageNotFollowing);
         cycles
     };
     // `armed` has commanded this speed for sixty cycles already; a new direction restarts the time.
@@ -313,7 +320,7 @@ fn a_stage_is_given_its_time_and_a_fifth_of_its_speed() {
         let decision = bench.cycle(|s| stage(s).velocity_m_s = 0.0499, Controls::default());
         assert_eq!(decision.tripped, None);
     }
-    assert_eq!(bench.until_off(|s| stage(s).velocity_m_s = 0.0501), (Cause::StageNotFollowing, 2));
+    assert_eq!(bench.until_off(|s| stage(s).velocity_m_s = 0.0501), (TripCause::StageNotFollowing, 2));
 }
 
 #[test]
@@ -324,7 +331,7 @@ fn one_late_cycle_in_a_hundred_is_too_many() {
         i += 1;
         s.lateness = Nanos(if i % 50 == 0 { 2 * T.0 - 1 } else { T.0 });
     });
-    assert_eq!((cause, cycles), (Cause::Overrun, 550), "the eleventh of a thousand");
+    assert_eq!((cause, cycles), (TripCause::Overrun, 550), "the eleventh of a thousand");
     let mut bench = Bench::armed();
     for i in 0..3000 {
         let lateness = Nanos(if i % 101 == 0 { 2 * T.0 - 1 } else { 0 });

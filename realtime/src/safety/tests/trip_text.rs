@@ -4,13 +4,13 @@ use super::*;
 
 #[test]
 fn every_cause_has_a_unit_a_requirement_and_a_remedy_of_its_own_kind() {
-    let causes = || RULES.iter().map(|rule| rule.cause).chain([Cause::StartUp]);
+    let causes = || RULES.iter().map(|rule| rule.cause).chain([TripCause::StartUp]);
     for cause in causes() {
         let remedy = cause.remedy();
         assert!(remedy.len() > 30 && remedy.ends_with('.'), "{cause:?}: {remedy}");
-        assert!(cause == Cause::StartUp || cause.requirement().is_some(), "{cause:?}");
+        assert!(cause == TripCause::StartUp || cause.requirement().is_some(), "{cause:?}");
         // Only causes of one kind share a remedy.
-        let kind = |cause: Cause| {
+        let kind = |cause: TripCause| {
             let name = format!("{cause:?}");
             let sides = ["Lateral", "Normal", "OverAmplitude", "AmplitudeRunaway"];
             sides.iter().any(|side| name.starts_with(side))
@@ -85,7 +85,7 @@ fn value_and_limit_of_a_trip_have_one_unit() {
 fn no_number_of_a_trip_is_minus_zero() {
     let backwards = Request { velocity_m_s: -0.02, normal_force_n: 0.25, ..Request::default() };
     let trip = tripped(backwards, |seen| stage(seen).velocity_m_s = 0.0);
-    assert_eq!((trip.cause, trip.value), (Cause::StageNotFollowing, 0.0));
+    assert_eq!((trip.cause, trip.value), (TripCause::StageNotFollowing, 0.0));
     assert!(trip.value.is_sign_positive(), "{:?}", trip.value);
 }
 
@@ -93,7 +93,7 @@ fn no_number_of_a_trip_is_minus_zero() {
 fn a_trip_of_an_older_record_is_read() {
     let old = r#"{"cause":"over_travel","value":0.1,"bound":0.05,"cycle":7,"at":7000000}"#;
     let trip: Trip = serde_json::from_str(old).unwrap();
-    assert_eq!((trip.cause, trip.unit), (Cause::OverTravel, Unit::Flag));
+    assert_eq!((trip.cause, trip.unit), (TripCause::OverTravel, Unit::Flag));
     let new = serde_json::to_string(&Trip { unit: Unit::Metre, ..trip }).unwrap();
     assert!(new.contains(r#""unit":"m""#), "{new}");
 }

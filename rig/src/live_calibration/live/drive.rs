@@ -4,9 +4,8 @@ use crate::wall_clock_loop::{LoopHandle, Parts, WallClockLoop};
 use miette::IntoDiagnostic;
 use models::{PeakToPeak, SpringSlider};
 use realtime::cycle::{Command, Marker};
-use realtime::pacing;
-use realtime::safety::{Cause, Request, Trip};
-use realtime::{Ports, Row};
+use realtime::safety::{Request, Trip, TripCause};
+use realtime::{Ports, Row, pacing, threads};
 use runs::Setup;
 use runs::job::Unfinished;
 use runs::supervisor::{Loop, OffReport};
@@ -66,12 +65,13 @@ impl Drive {
             links: rig.links,
             pacing: setup.file.pace.pacing(),
             origin_ns,
-        })?;
+        })
+        .into_diagnostic()?;
         let seen = Arc::new(Mutex::new(Seen::default()));
         let ended = Arc::new(AtomicBool::new(false));
         let (note, stop, done) = (Arc::clone(&seen), Arc::clone(&interrupted), Arc::clone(&ended));
         let watch = move || watch(handle, &note, &stop, &done);
-        let watching = std::thread::Builder::new().name("watch".into()).spawn(watch).into_diagnostic()?;
+        let watching = threads::spawn("watch", watch).into_diagnostic()?;
         Ok(Drive { rig, seen, interrupted, ended, watching: Some(watching) })
     }
 
@@ -110,7 +110,7 @@ impl Drive {
             if began.elapsed().as_secs_f64() > ARM_WITHIN_S {
                 let waits_for = self.seen().row.and_then(|row| row.waits_for);
                 let tripped = || self.seen().tripped.map(|trip| trip.cause);
-                let cause = waits_for.or_else(tripped).unwrap_or(Cause::SupplySwitch);
+                let cause = waits_for.or_else(tripped).unwrap_or(TripCause::SupplySwitch);
                 let (help, words) = (cause.remedy(), cause.words());
                 miette::bail!(help = help, "the rig does not arm within {ARM_WITHIN_S} s: {words}");
             }

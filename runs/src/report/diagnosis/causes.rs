@@ -5,8 +5,7 @@ use super::mechanism::drawing;
 use super::overlay::Overlay;
 use crate::report::html::{bar, cell, columns, escape, numeric, row, table};
 use crate::verdict_text::{EXPLAINED, aliases, estimate, name};
-use diagnosis::report::format::plain;
-use diagnosis::report::format::probability;
+use diagnosis::report::format::{plain, probability};
 use diagnosis::report::intervals::Estimate;
 use diagnosis::{Diagnosis, Hypothesis};
 

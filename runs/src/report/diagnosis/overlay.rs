@@ -38,7 +38,7 @@ pub struct Overlay<'a> {
 impl<'a> Overlay<'a> {
     /// Over a diagnosed table with its forecasts. Every `mu'` is over one `mu_0`, that of the recalibrated baseline.
     pub fn new(result: &'a Diagnosis, table: &'a Table, forecasts: &'a [Forecast]) -> Self {
-        let mu0 = result.fitted.problem.baseline(&result.fitted.none.u).mu0;
+        let mu0 = result.fitted.problem.baseline(&result.fitted.baseline.u).mu0;
         let suspects = result.report.scatter.suspects.iter().map(|s| s.row).collect();
         Overlay { result, table, forecasts, mu0, suspects }
     }

@@ -5,7 +5,7 @@ use crate::report::html::{columns, escape, note, numeric, row, table};
 use crate::report::plots::verdict::edge;
 use diagnosis::Diagnosis;
 use diagnosis::report::format::probability;
-use diagnosis::report::timing::{Comparison, FormNote, ResponseForm, title};
+use diagnosis::report::timing::{FormNote, ResponseForm, TimingComparison, title};
 
 /// The section; empty for a table without a record.
 pub fn section(result: &Diagnosis) -> miette::Result<String> {
@@ -16,12 +16,11 @@ pub fn section(result: &Diagnosis) -> miette::Result<String> {
         Some(hz) => format!("a passband of {hz} Hz; its delay is taken off."),
     };
     text.extend(record.comparisons.iter().map(|c| format!("<p>{}.</p>", escape(&c.text))));
-    let judged: Vec<&Comparison> = record.comparisons.iter().filter(|c| c.late_s.is_some()).collect();
+    let judged: Vec<&TimingComparison> = record.comparisons.iter().filter(|c| c.late_s.is_some()).collect();
     if judged.is_empty() {
         return Ok(text);
     }
-    let figures: miette::Result<Vec<String>> =
-        judged.iter().map(|c| edge(title(c.against), &c.mean)).collect();
+    let figures: miette::Result<Vec<_>> = judged.iter().map(|c| edge(title(c.against), &c.mean)).collect();
     text += &format!("<div class=\"panels\">{}</div>", figures?.concat());
     text += &note(&format!(
         "Mean of the edges, as a share of the change of force. Points: measured. Dashes: expected of a channel in time. \

@@ -5,11 +5,11 @@ use super::{
     measured, mu_axis, mu_on, series_key,
 };
 use crate::compare::groups::{GroupDifference, Grouped};
-use crate::compare::{Comparison, Mean, Paired};
+use crate::compare::{Mean, Paired, RunComparison};
 use crate::report::levels::{FORCE, FREQUENCY, Levels, SPEED};
 
 /// Both runs' `mu'` against amplitude, at the conditions that they have in common; a line joins the two of each condition.
-pub fn overlay(result: &Comparison) -> miette::Result<String> {
+pub fn overlay(result: &RunComparison) -> miette::Result<String> {
     let widest = widest(result);
     let means = || result.pairs.iter().flat_map(|p| [p.a, p.b]);
     let mu = mu_axis(means().flat_map(|m| [m.mu_relative - m.sd, m.mu_relative + m.sd]));
@@ -50,7 +50,7 @@ const FACTORS: [Factor; 3] = [
 
 /// The differences against amplitude, a mark a level of the factor that varies most, with the shift that they
 /// have in common unless they vary by more than their uncertainty.
-pub fn differences(result: &Comparison) -> miette::Result<String> {
+pub fn differences(result: &RunComparison) -> miette::Result<String> {
     let widest = widest(result);
     let [low, high] = about_zero(
         result.pairs.iter().flat_map(|p| [p.difference - p.difference_sd, p.difference + p.difference_sd]),
@@ -100,7 +100,7 @@ fn about_zero(ends: impl Iterator<Item = f64>) -> [f64; 2] {
     [low - 0.05 * (high - low), high + 0.05 * (high - low)]
 }
 
-fn widest(result: &Comparison) -> f64 {
+fn widest(result: &RunComparison) -> f64 {
     1.05 * result.pairs.iter().map(|p| p.amplitude_pp_m * 1e6).fold(0.1, f64::max)
 }
 

@@ -19,7 +19,7 @@ use std::collections::BTreeMap;
 const PLACES: u32 = 120;
 
 /// An axis: what it shows of a pass and of a published value.
-struct Axis {
+struct PaperAxis {
     title: &'static str,
     covariate: &'static Covariate,
     /// How far, as a share, the values of one setting lie apart.
@@ -29,7 +29,7 @@ struct Axis {
     papers: [f64; 2],
 }
 
-impl Axis {
+impl PaperAxis {
     const fn new(
         title: &'static str,
         covariate: &'static Covariate,
@@ -37,7 +37,7 @@ impl Axis {
         published: fn(&Published) -> Option<f64>,
         papers: [f64; 2],
     ) -> Self {
-        Axis { title, covariate, within, published, papers }
+        PaperAxis { title, covariate, within, published, papers }
     }
 
     fn of(&self, c: &Condition) -> f64 {
@@ -45,13 +45,13 @@ impl Axis {
     }
 }
 
-static AXES: [Axis; 5] = [
-    Axis::new(AMPLITUDE, &covariate::AMPLITUDE, FREQUENCY, |p| p.amplitude_pp_m, [0.0, 5e-6]),
-    Axis::new("frequency f, kHz", &covariate::FREQUENCY, FREQUENCY, |p| p.frequency_hz, [10e3, 100e3]),
-    Axis::new("speed U, mm/s", &covariate::SPEED, SPEED, |p| p.speed_m_s, [5e-3, 0.1]),
+static AXES: [PaperAxis; 5] = [
+    PaperAxis::new(AMPLITUDE, &covariate::AMPLITUDE, FREQUENCY, |p| p.amplitude_pp_m, [0.0, 5e-6]),
+    PaperAxis::new("frequency f, kHz", &covariate::FREQUENCY, FREQUENCY, |p| p.frequency_hz, [10e3, 100e3]),
+    PaperAxis::new("speed U, mm/s", &covariate::SPEED, SPEED, |p| p.speed_m_s, [5e-3, 0.1]),
     // No panels: load and pressure only say which passes belong together.
-    Axis::new("load, N", &covariate::NORMAL_FORCE, FORCE, |p| p.normal_force_n, [0.1, 1.0]),
-    Axis::new("pressure, kPa", &covariate::AMBIENT_PRESSURE, PRESSURE, |_| None, [0.0, 1e7]),
+    PaperAxis::new("load, N", &covariate::NORMAL_FORCE, FORCE, |p| p.normal_force_n, [0.1, 1.0]),
+    PaperAxis::new("pressure, kPa", &covariate::AMBIENT_PRESSURE, PRESSURE, |_| None, [0.0, 1e7]),
 ];
 
 /// The three panels; their captions state what is not drawn.

@@ -64,8 +64,7 @@ pub fn mu_against_amplitude(run: &RunData) -> miette::Result<String> {
     let svg = figure(WIDE, x, mu_on(axis), &alt, |chart, size| {
         for i in 0..speeds.count() {
             let colour = COLOURS[i % COLOURS.len()];
-            let of_speed: Vec<&&MeasuredPass> =
-                chosen.iter().filter(|p| speeds.index(speed(p)) == i).collect();
+            let of_speed: Vec<_> = chosen.iter().filter(|p| speeds.index(speed(p)) == i).collect();
             if let (Some(mu0), Some(first)) = (mu0, of_speed.first()) {
                 let at = |w: f64| {
                     let amplitude = PeakToPeak::from_metres(w * 1e-6);

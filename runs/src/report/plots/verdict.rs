@@ -1,8 +1,8 @@
 //! The figures of a verdict.
 
 use super::{
-    AxisRange, COLOURS, GREY, PANEL, band, beyond, draw, edge_of, figure, line, mark, measured, mu_axis,
-    mu_on,
+    AxisRange, COLOURS, Chart, GREY, PANEL, band, beyond, draw, edge_of, figure, line, mark, measured,
+    mu_axis, mu_on,
 };
 use crate::format::titled;
 use crate::report::html::escape;
@@ -54,11 +54,7 @@ pub fn overlay(
 }
 
 /// Rings around suspects.
-fn rings(
-    chart: &mut super::Chart<'_>,
-    at: impl Iterator<Item = (f64, f64)>,
-    size: u32,
-) -> miette::Result<()> {
+fn rings(chart: &mut Chart<'_>, at: impl Iterator<Item = (f64, f64)>, size: u32) -> miette::Result<()> {
     draw(chart, at.map(|p| Circle::new(p, size + 4, COLOURS[3].stroke_width(2))))
 }
 

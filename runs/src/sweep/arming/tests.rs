@@ -6,7 +6,7 @@ use crate::supervisor::{self, Loop, Requests, VirtualLoop};
 use crate::{Event, Outcome, Setup, Sweep};
 use models::{FrictionModel, SpringSlider};
 use realtime::ports::{Amplifier, AmplifierState, Contacts, Nanos, NoData, SafetyInputs};
-use realtime::safety::{Cause, DriveCommand, Limits};
+use realtime::safety::{DriveCommand, Limits, TripCause};
 use realtime::{Command, Ports, Row};
 use sim::virtual_rig::{SharedRig, VirtualRig};
 use std::sync::Arc;
@@ -143,7 +143,7 @@ fn swept(before: Before) -> (Outcome, Vec<Event>, Vec<Row>) {
     (outcome, events, rows)
 }
 
-fn disturbed(events: &[Event]) -> Vec<(Cause, u64)> {
+fn disturbed(events: &[Event]) -> Vec<(TripCause, u64)> {
     let of = |event: &Event| match event {
         Event::ArmingDisturbed { cause, held_up } => Some((*cause, held_up.0 / MS)),
         _ => None,
@@ -163,9 +163,9 @@ fn a_stall_before_arming_is_reported_and_the_second_channel_proved() {
     for (cycle, ms, waits) in [(3, 90, 40..80), (10, 90, 40..80), (40, 90, 40..80), (10, 120, 900..1100)] {
         let (outcome, events, rows) = swept(Before { stall: Some((cycle, ms)), ..Before::default() });
         assert_eq!(outcome, Outcome::Complete, "{events:?}");
-        assert_eq!(disturbed(&events), [(Cause::EmergencyStop, ms)]);
+        assert_eq!(disturbed(&events), [(TripCause::EmergencyStop, ms)]);
         let explained =
-            |row: &&Row| row.supply_cut && !row.proving && row.blocking == Some(Cause::AmplifierFault);
+            |row: &&Row| row.supply_cut && !row.proving && row.blocking == Some(TripCause::AmplifierFault);
         let shown = rows.iter().filter(explained).count();
         assert!(waits.contains(&shown), "the fault that the cut explains was shown for {shown} cycles");
     }
@@ -173,7 +173,7 @@ fn a_stall_before_arming_is_reported_and_the_second_channel_proved() {
 
 #[test]
 fn a_proof_that_a_stall_broke_off_is_made_again_and_told() {
-    for (ms, cause) in [(120, Cause::Suspended), (48, Cause::Overrun)] {
+    for (ms, cause) in [(120, TripCause::Suspended), (48, TripCause::Overrun)] {
         let (outcome, events, rows) = swept(Before { proofs: Some((1, ms)), ..Before::default() });
         assert_eq!(outcome, Outcome::Complete, "{events:?}");
         assert_eq!(disturbed(&events), [(cause, ms)], "{events:?}");
@@ -194,23 +194,26 @@ fn a_proof_that_a_stall_broke_off_is_made_again_and_told() {
 #[test]
 fn a_stop_that_was_pressed_before_arming_is_not_cleared_by_the_sweep() {
     let (outcome, events, rows) = swept(Before { pressed: [10, 300], ..Before::default() });
-    assert_eq!(outcome, Outcome::WouldNotArm { blocking: Some(Cause::EmergencyStop) }, "{events:?}");
+    assert_eq!(outcome, Outcome::WouldNotArm { blocking: Some(TripCause::EmergencyStop) }, "{events:?}");
     // A person reads what stopped it, no name of the code.
-    assert_eq!(outcome.words(), format!("the rig would not arm: {}", Cause::EmergencyStop.words()));
+    assert_eq!(outcome.words(), format!("the rig would not arm: {}", TripCause::EmergencyStop.words()));
     assert!(rows.iter().skip(10).all(|row| row.supply_cut && !row.proving));
     // In the midst of a proof too, whatever the machine does.
     let (outcome, ..) = swept(Before { pressed: [54, 300], proofs: Some((1, 9)), ..Before::default() });
-    assert!(matches!(outcome, Outcome::Tripped(trip) if trip.cause == Cause::EmergencyStop), "{outcome:?}");
+    assert!(
+        matches!(outcome, Outcome::Tripped(trip) if trip.cause == TripCause::EmergencyStop),
+        "{outcome:?}"
+    );
 }
 
 #[test]
 fn a_fault_of_the_amplifiers_own_is_its_own_beside_a_stall_too() {
     let (outcome, events, _) = swept(Before { faulty: true, ..Before::default() });
-    assert_eq!(outcome, Outcome::WouldNotArm { blocking: Some(Cause::AmplifierFault) });
+    assert_eq!(outcome, Outcome::WouldNotArm { blocking: Some(TripCause::AmplifierFault) });
     assert!(events.is_empty(), "{events:?}");
     // Cut for a silent board, only the proof can tell: closed again, the fault is still there.
     let (outcome, events, rows) = swept(Before { faulty: true, stall: Some((10, 120)), ..Before::default() });
     let Outcome::Tripped(trip) = outcome else { panic!("{outcome:?} {events:?}") };
-    assert_eq!((trip.cause, trip.bound), (Cause::AmplifierFault, 5.0));
+    assert_eq!((trip.cause, trip.bound), (TripCause::AmplifierFault, 5.0));
     assert!(rows.iter().all(|row| !row.armed));
 }

@@ -2,7 +2,7 @@
 
 use super::{Case, CaseKind, document, flag, no_lines, number, settings, text, word};
 use crate::cases::{file::Header, run::here};
-pub use crate::validation::blind::Settings;
+pub use crate::validation::blind::BlindStudy;
 use crate::validation::blind::{Scored, score, set};
 
 /// The kind.
@@ -28,7 +28,7 @@ pub const KIND: CaseKind = CaseKind {
 
 fn prepare(header: &Header, _: &std::path::Path) -> miette::Result<super::Make> {
     no_lines(header)?;
-    let settings: Settings = settings(header)?;
+    let settings: BlindStudy = settings(header)?;
     let inputs = serde_json::to_string(&settings).unwrap_or_default();
     let options = settings.options()?;
     Ok(Box::new(move |index, _| {
@@ -58,7 +58,7 @@ fn prepare(header: &Header, _: &std::path::Path) -> miette::Result<super::Make> 
 ///
 /// # Errors
 /// A constant that there is not, or a set that the diagnosis refuses.
-pub fn run(settings: &Settings, sets: u64, watch: &mut dyn FnMut(&Scored)) -> miette::Result<Vec<Scored>> {
+pub fn run(settings: &BlindStudy, sets: u64, watch: &mut dyn FnMut(&Scored)) -> miette::Result<Vec<Scored>> {
     let mut all = Vec::new();
     here(&KIND, settings, sets, &mut |cells| {
         let scored = document(&cells)?;

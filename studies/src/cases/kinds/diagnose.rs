@@ -43,7 +43,7 @@ pub struct Line {
 /// What all cases share, and options of the command line.
 #[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize, clap::Args)]
 #[serde(default, deny_unknown_fields)]
-pub struct Settings {
+pub struct DiagnosisSettings {
     /// Try single effects only
     #[arg(long)]
     pub no_pairs: bool,
@@ -57,7 +57,7 @@ pub struct Settings {
 }
 
 fn prepare(header: &Header, folder: &Path) -> miette::Result<super::Make> {
-    let settings: Settings = super::settings(header)?;
+    let settings: DiagnosisSettings = super::settings(header)?;
     if let Some(name) = settings.without.iter().find(|name| effects::by_name(name).is_none()) {
         miette::bail!("without {name}: no such effect; `muprime model effects` lists them");
     }

@@ -3,7 +3,7 @@
 use super::{Case, CaseKind, Cell, count, document, no_lines, settings, text, word};
 use crate::cases::{file::Header, run::here};
 use crate::validation::faults::search::{judged, scene_of};
-use crate::validation::faults::{Found, Pace, ROWS, Tally};
+use crate::validation::faults::{Pace, ROWS, SceneResult, Tally};
 use serde::{Deserialize, Serialize};
 
 /// The kind.
@@ -29,7 +29,7 @@ pub const KIND: CaseKind = CaseKind {
 /// What all cases share.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
 #[serde(default, deny_unknown_fields)]
-pub struct Settings {
+pub struct FaultSettings {
     /// Seed of case 0.
     pub first: u64,
     /// Two faults in each scene.
@@ -40,15 +40,15 @@ pub struct Settings {
     pub twice: bool,
 }
 
-impl Default for Settings {
+impl Default for FaultSettings {
     fn default() -> Self {
-        Settings { first: 1, pairs: false, pace: Pace::Fast, twice: false }
+        FaultSettings { first: 1, pairs: false, pace: Pace::Fast, twice: false }
     }
 }
 
 fn prepare(header: &Header, _: &std::path::Path) -> miette::Result<super::Make> {
     no_lines(header)?;
-    let Settings { first, pairs, pace, twice } = settings(header)?;
+    let FaultSettings { first, pairs, pace, twice } = settings(header)?;
     Ok(Box::new(move |index, _| {
         let seed = first.wrapping_add(index);
         let run = move || {
@@ -77,10 +77,10 @@ fn prepare(header: &Header, _: &std::path::Path) -> miette::Result<super::Make> 
 ///
 /// # Errors
 /// A fault of the program in a scene.
-pub fn search(settings: &Settings, seeds: u64, watch: &mut dyn FnMut(&Tally)) -> miette::Result<Tally> {
+pub fn search(settings: &FaultSettings, seeds: u64, watch: &mut dyn FnMut(&Tally)) -> miette::Result<Tally> {
     let (mut tally, mut next) = (Tally::default(), settings.first);
     here(&KIND, settings, seeds, &mut |cells| {
-        let found: Found = document(&cells)?;
+        let found: SceneResult = document(&cells)?;
         tally.count(&scene_of(next, settings.pairs, settings.pace), found, settings.twice);
         next = next.wrapping_add(1);
         watch(&tally);

@@ -42,7 +42,7 @@ pub struct Line {
 /// What all cases share.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 #[serde(default, deny_unknown_fields)]
-pub struct Settings {
+pub struct FingerSettings {
     /// Elements of the mesh, about.
     pub elements: usize,
     /// Identify the modulus alone.
@@ -51,17 +51,17 @@ pub struct Settings {
     pub modulus_range_pa: [f64; 2],
 }
 
-impl Default for Settings {
+impl Default for FingerSettings {
     fn default() -> Self {
         let elements = models::ridge::case::ELEMENTS;
-        Settings { elements, modulus_only: false, modulus_range_pa: [10e6, 1e9] }
+        FingerSettings { elements, modulus_only: false, modulus_range_pa: [10e6, 1e9] }
     }
 }
 
 fn prepare(header: &Header, folder: &Path) -> miette::Result<super::Make> {
-    let settings: Settings = super::settings(header)?;
+    let settings: FingerSettings = super::settings(header)?;
     let rest = serde_json::to_string(&settings).unwrap_or_default();
-    let Settings { elements, modulus_only, modulus_range_pa } = settings;
+    let FingerSettings { elements, modulus_only, modulus_range_pa } = settings;
     let folder = folder.to_path_buf();
     Ok(Box::new(move |index, given| {
         let Line { phases, frequency_hz, normal_force_n } = line(index, given)?;

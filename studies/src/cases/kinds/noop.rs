@@ -17,7 +17,7 @@ pub const KIND: CaseKind = CaseKind {
 /// What all cases share, and options of the command line.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Serialize, Deserialize, clap::Args)]
 #[serde(default, deny_unknown_fields)]
-pub struct Settings {
+pub struct NoopSettings {
     /// Hashes of each: some five million a second
     #[arg(long, default_value_t = 0)]
     pub hashes: u64,
@@ -25,7 +25,7 @@ pub struct Settings {
 
 fn prepare(header: &Header, _: &std::path::Path) -> miette::Result<super::Make> {
     no_lines(header)?;
-    let Settings { hashes } = settings(header)?;
+    let NoopSettings { hashes } = settings(header)?;
     Ok(Box::new(move |index, _| {
         let run = move || {
             let mut digest: [u8; 32] = Sha256::digest(index.to_le_bytes()).into();

@@ -79,7 +79,7 @@ impl ValueRange {
 /// What all cases share.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 #[serde(default, deny_unknown_fields)]
-pub struct Settings {
+pub struct RidgeSettings {
     /// Elements of the mesh, about.
     pub elements: usize,
     /// When a case ends.
@@ -95,14 +95,14 @@ pub struct Settings {
     pub case: Option<RidgeCase>,
 }
 
-impl Default for Settings {
+impl Default for RidgeSettings {
     fn default() -> Self {
         let (base, spans) = Default::default();
-        Settings { elements: case::ELEMENTS, steady: Steady::default(), base, spans, first: 1, case: None }
+        Self { elements: case::ELEMENTS, steady: Steady::default(), base, spans, first: 1, case: None }
     }
 }
 
-impl Settings {
+impl RidgeSettings {
     /// Refuses a variable that is both shared and drawn, and a span beyond what a ridge can have.
     pub fn check_spans(&self) -> miette::Result<()> {
         for (name, ValueRange { low, high, .. }) in &self.spans {
@@ -184,7 +184,7 @@ pub fn kronecker(n: u64, dimensions: usize) -> Vec<f64> {
 }
 
 fn prepare(header: &Header, _: &std::path::Path) -> miette::Result<super::Make> {
-    let settings: Settings = super::settings(header)?;
+    let settings: RidgeSettings = super::settings(header)?;
     let start = settings.case.unwrap_or(RidgeCase { elements: settings.elements, ..RidgeCase::paper() });
     let base = set(start, &settings.base)?;
     if header.listed != settings.spans.is_empty() {
@@ -263,7 +263,7 @@ mod tests {
         let check = |name: &str, low, high| {
             let spans = BTreeMap::from([(name.to_string(), ValueRange { low, high, log: false })]);
             let base = BTreeMap::from([("mu0".to_string(), 0.4)]);
-            Settings { base, spans, ..Settings::default() }.check_spans()
+            RidgeSettings { base, spans, ..RidgeSettings::default() }.check_spans()
         };
         check("amplitude_pp_m", 0.3e-6, 5e-6).unwrap();
         check("normal_force_n", 0.1, 2.0).unwrap();

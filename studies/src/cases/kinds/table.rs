@@ -5,7 +5,7 @@ use crate::cases::file::Header;
 use crate::cases::run::Entry;
 use miette::bail;
 use models::ridge::{self, study};
-use models::surrogate::{Grid, GridPoint, TableResult};
+use models::surrogate::{GridPoint, SurrogateGrid, TableResult};
 
 /// The kind.
 pub const KIND: CaseKind = CaseKind {
@@ -27,7 +27,7 @@ pub const HELD_OUT: usize = 200;
 
 /// The nodes, and after them those that are held out.
 pub fn points() -> Vec<GridPoint> {
-    let grid = Grid::SHIPPED;
+    let grid = SurrogateGrid::SHIPPED;
     [grid.points(), grid.held_out(HELD_OUT)].concat()
 }
 
@@ -37,7 +37,7 @@ fn prepare(header: &Header, _: &std::path::Path) -> miette::Result<super::Make> 
     if header.cases > points.len() as u64 {
         bail!("{} cases: the table has {} nodes, held-out ones included", header.cases, points.len());
     }
-    let settings = Grid::settings();
+    let settings = SurrogateGrid::settings();
     Ok(Box::new(move |index, _| {
         let GridPoint { case, at_rest, .. } = points[index as usize].clone();
         let run = move || {

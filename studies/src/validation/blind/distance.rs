@@ -47,7 +47,7 @@ pub fn distance(set: &Set) -> Option<f64> {
         let squares = problem.lateral.iter().zip(fit.prediction.iter()).zip(&problem.passes);
         squares.map(|((y, m), p)| ((y - m) / p.normal_force_n).powi(2)).sum::<f64>().sqrt()
     };
-    let none = left(&[], &fitted.none.u);
+    let none = left(&[], &fitted.baseline.u);
     let best = candidate.laws.iter().map(|(_, law)| left(&law.members, &law.u)).fold(f64::INFINITY, f64::min);
     (none > 0.0).then_some(best / none)
 }

@@ -6,7 +6,7 @@ use sim::sealed::{DETECTABLE, PAIR_LEAVES, Stratum};
 
 /// One entry of a list.
 #[derive(Debug, Clone, Copy, Serialize, Deserialize)]
-pub struct Entry {
+pub struct StatedChance {
     /// Stated probability.
     pub probability: f64,
     /// Whether it is the truth.
@@ -41,7 +41,7 @@ pub fn identifiable(s: &Scored) -> bool {
 
 /// The diagram over some sets.
 pub fn diagram<'a>(sets: impl Iterator<Item = &'a Scored>) -> Vec<Bin> {
-    let mut bins: Vec<Vec<Entry>> = vec![Vec::new(); BOUNDS.len() + 1];
+    let mut bins: Vec<Vec<StatedChance>> = vec![Vec::new(); BOUNDS.len() + 1];
     for entry in sets.flat_map(|s| &s.entries) {
         bins[BOUNDS.partition_point(|b| *b <= entry.probability)].push(*entry);
     }

@@ -9,7 +9,7 @@
 use super::tamper::Tamper;
 use realtime::Nanos;
 use realtime::fault::{FaultMode, FaultTarget};
-use realtime::safety::{Cause, ChannelTiming, Limits, Timing};
+use realtime::safety::{ChannelTiming, Limits, Timing, TripCause};
 use serde::{Deserialize, Serialize};
 
 /// What the rig is doing when a fault strikes.
@@ -177,7 +177,7 @@ pub struct FaultRow {
     /// What must follow.
     pub expect: Expect,
     /// Causes that a trip may name.
-    pub causes: &'static [Cause],
+    pub causes: &'static [TripCause],
     /// When it can strike.
     pub moments: &'static [Moment],
 }
@@ -195,7 +195,7 @@ macro_rules! rows {
     ($($number:literal $name:literal $moments:ident $what:expr => $expect:expr $(, $($cause:ident)|+)?;)*) => {
         /// The list.
         pub const ROWS: &[FaultRow] = &[$(FaultRow {
-            number: $number, name: $name, what: $what, expect: $expect, causes: &[$($(Cause::$cause),+)?], moments: $moments,
+            number: $number, name: $name, what: $what, expect: $expect, causes: &[$($(TripCause::$cause),+)?], moments: $moments,
         },)*];
     };
 }

@@ -4,15 +4,14 @@
 use super::rows::{Expect, Moment, Pace, ROWS, TOO_LATE, What};
 use super::tamper::{Tamper, Tampered};
 use calibration::certificate::sha256_hex;
-use models::Target;
 use models::law::Rendering;
 use models::prediction::{FrictionModel, Prediction, SpringSlider};
-use models::{Condition, Finger, OutOfDomain, PeakToPeak};
+use models::{Condition, Finger, OutOfDomain, PeakToPeak, Target};
 use realtime::cycle::{Command, Config, Marker, Phase};
 use realtime::estimate::{EstimateConfig, Mu0};
 use realtime::fault::{Fault, FaultMode, FaultyAmplifier, FaultyForce, FaultyStage};
 use realtime::replay::replay;
-use realtime::safety::{Cause, Exposed, Limits, Request, Trip};
+use realtime::safety::{Exposed, Limits, Request, Trip, TripCause};
 use realtime::{Nanos, Ports, Row};
 use runs::supervisor::{Loop, VirtualLoop};
 use serde::{Deserialize, Serialize};
@@ -76,7 +75,7 @@ pub enum Core {
 
 /// What came of a scene.
 #[derive(Clone, Debug, Default, Serialize, Deserialize)]
-pub struct Found {
+pub struct SceneResult {
     /// Cycles that were simulated.
     pub cycles: u64,
     /// The trip, if there was one.
@@ -249,7 +248,7 @@ impl Scene {
 }
 
 /// Runs a scene with the core as it is. With `keep` its rows are hashed, and run again through the cycle.
-pub fn run(scene: &Scene, keep: bool) -> Found {
+pub fn run(scene: &Scene, keep: bool) -> SceneResult {
     run_with(scene, keep, Core::Sound)
 }
 
@@ -257,7 +256,7 @@ pub fn run(scene: &Scene, keep: bool) -> Found {
 ///
 /// # Panics
 /// Only if the bench's own limits or world are not allowed: a fault of this module.
-pub fn run_with(scene: &Scene, keep: bool, core: Core) -> Found {
+pub fn run_with(scene: &Scene, keep: bool, core: Core) -> SceneResult {
     let limits = scene.limits().checked().expect("the bench's limits are within the hard ones");
     let estimate = EstimateConfig::default();
     let config = Config { limits, estimate, exposed: Exposed::default() };
@@ -268,7 +267,7 @@ pub fn run_with(scene: &Scene, keep: bool, core: Core) -> Found {
     let shown = Arc::new(AtomicU64::new(0));
     let (world, ports) = wired(scene, deaf, &shown);
     let mut controller = VirtualLoop::new(config, Arc::clone(&model) as Arc<dyn FrictionModel>, ports);
-    let mut watch = Watch { shown: vec![None; scene.strikes.len()], ..Watch::default() };
+    let mut watch = SceneNotes { shown: vec![None; scene.strikes.len()], ..SceneNotes::default() };
     let mut rows = Vec::new();
     let mut request = Request::default();
     let rogue = scene.first(|w| w == What::RogueMaster);
@@ -315,7 +314,8 @@ pub fn run_with(scene: &Scene, keep: bool, core: Core) -> Found {
         }
         let mut row = controller.cycle_at(now, lateness);
         if let (Core::Mistaken, Some(trip)) = (core, &mut row.tripped) {
-            trip.cause = if trip.cause == Cause::Overrun { Cause::Stopped } else { Cause::Overrun };
+            trip.cause =
+                if trip.cause == TripCause::Overrun { TripCause::Stopped } else { TripCause::Overrun };
         }
         if rogue.is_some_and(|at| cycle >= at) && !deaf {
             world.rig().world.command_amplifier(AmplifierInput {
@@ -361,7 +361,7 @@ fn wired(scene: &Scene, deaf: bool, shown: &Arc<AtomicU64>) -> (SharedRig, Ports
 }
 
 /// What a record would hold, run again: the decisions must be the same.
-fn run_again(config: &Config, model: &dyn FrictionModel, rows: &[Row], found: &mut Found) {
+fn run_again(config: &Config, model: &dyn FrictionModel, rows: &[Row], found: &mut SceneResult) {
     let written: Vec<u8> = rows.iter().flat_map(|row| serde_json::to_vec(row).unwrap_or_default()).collect();
     found.hash = Some(sha256_hex(&written));
     let written = rows.iter().filter_map(|r| serde_json::from_slice(&serde_json::to_vec(r).ok()?).ok());
@@ -373,7 +373,7 @@ fn run_again(config: &Config, model: &dyn FrictionModel, rows: &[Row], found: &m
 
 /// What is noted while a scene runs.
 #[derive(Default)]
-struct Watch {
+struct SceneNotes {
     shown: Vec<Option<u64>>,
     off_at: Option<u64>,
     trip: Option<Trip>,
@@ -388,7 +388,7 @@ struct Watch {
     wrong: Vec<String>,
 }
 
-impl Watch {
+impl SceneNotes {
     /// The plate while the controller stands still.
     fn alone(&mut self, ms: u64, amplitude: f64) {
         if ms == 0 {
@@ -445,17 +445,17 @@ impl Watch {
         }
     }
 
-    fn judge(mut self, scene: &Scene) -> Found {
+    fn judge(mut self, scene: &Scene) -> SceneResult {
         if !self.armed {
             self.wrong.push("the rig would not arm".into());
         }
         let (mut shown_cycles, mut command_off) = (Vec::new(), Vec::new());
         let alone = scene.strikes.len() == 1;
         let timing = scene.pace.timing(T, RING);
-        let mut may: Vec<Cause> = scene.strikes.iter().flat_map(|s| ROWS[s.row].causes).copied().collect();
-        if scene.moment == Moment::Render && may.contains(&Cause::AmplitudeFrozen) {
+        let mut may: Vec<_> = scene.strikes.iter().flat_map(|s| ROWS[s.row].causes).copied().collect();
+        if scene.moment == Moment::Render && may.contains(&TripCause::AmplitudeFrozen) {
             // A reading that stands while the command falls is too high before it counts as frozen.
-            may.push(Cause::AmplitudeRunaway);
+            may.push(TripCause::AmplitudeRunaway);
         }
         if let Some(trip) = self.trip.filter(|t| !scene.strikes.is_empty() && !may.contains(&t.cause)) {
             self.wrong.push(format!("tripped for {:?}, which is none of {may:?}", trip.cause));
@@ -486,7 +486,7 @@ impl Watch {
                 Expect::Off(within) if !already => {
                     // A reading that may be late is too high only above all that was commanded meanwhile.
                     let changes =
-                        scene.moment == Moment::Render && row.causes.contains(&Cause::AmplitudeRunaway);
+                        scene.moment == Moment::Render && row.causes.contains(&TripCause::AmplitudeRunaway);
                     let meanwhile = if changes { timing.response().0 / T.0 } else { 0 };
                     let bound = within.at(&timing) + meanwhile;
                     let masked = interact(scene) && in_the_slower;
@@ -527,7 +527,7 @@ impl Watch {
             self.wrong.push(format!("the amplifier's own watchdog: {:?} ms", self.alone_quiet_at));
         }
         let (cycles, trip, wrong) = (scene.length(), self.trip, self.wrong);
-        Found { cycles, trip, shown: shown_cycles, command_off, measured_off, wrong, hash: None }
+        SceneResult { cycles, trip, shown: shown_cycles, command_off, measured_off, wrong, hash: None }
     }
 }
 

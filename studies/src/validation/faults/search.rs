@@ -1,7 +1,7 @@
 //! The scene of a seed, the tally of many scenes' reactions, and a failure made small.
 
 use super::rows::{Expect, Moment, Pace, ROWS};
-use super::scene::{Found, RING, STEADY_AT, Scene, Strike, T, measured_bound, run};
+use super::scene::{RING, STEADY_AT, Scene, SceneResult, Strike, T, measured_bound, run};
 use rand::{RngExt, SeedableRng};
 use rand_chacha::ChaCha8Rng;
 use serde::Serialize;
@@ -90,7 +90,7 @@ fn compatible(a: usize, b: usize) -> bool {
 
 impl Tally {
     /// Counts what came of a scene.
-    pub fn count(&mut self, scene: &Scene, found: Found, twice: bool) {
+    pub fn count(&mut self, scene: &Scene, found: SceneResult, twice: bool) {
         self.scenes += 1;
         self.cycles += found.cycles * if twice { 2 } else { 1 };
         for (i, strike) in scene.strikes.iter().enumerate() {
@@ -116,7 +116,7 @@ impl Tally {
 }
 
 /// Runs a scene; with `twice` two runs must leave equal hashes.
-pub fn judged(scene: &Scene, twice: bool) -> Found {
+pub fn judged(scene: &Scene, twice: bool) -> SceneResult {
     let mut found = run(scene, twice);
     if twice && run(scene, true).hash != found.hash {
         found.wrong.push("two runs of one seed differ".into());

@@ -16,7 +16,7 @@ pub struct Node {
 
 /// What a value is, whatever the language.
 pub enum Is {
-    Table(Vec<Entry>),
+    Table(Vec<TreeEntry>),
     List(Vec<Node>),
     Text(String),
     Integer,
@@ -27,7 +27,7 @@ pub enum Is {
 }
 
 /// A key of a table, its place, and its value.
-pub type Entry = (String, TextRange, Node);
+pub type TreeEntry = (String, TextRange, Node);
 
 impl Node {
     fn toml(value: &Spanned<DeValue<'_>>) -> Self {
@@ -61,7 +61,7 @@ impl Node {
 }
 
 /// The entries of a table in TOML.
-pub fn entries(table: &DeTable<'_>) -> Vec<Entry> {
+pub fn entries(table: &DeTable<'_>) -> Vec<TreeEntry> {
     table.iter().map(|(k, v)| (k.get_ref().to_string(), Some(k.span()), Node::toml(v))).collect()
 }
 

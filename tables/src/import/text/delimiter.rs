@@ -125,8 +125,7 @@ fn regrouped(line: &str, usual: usize) -> Vec<String> {
         return plain;
     }
     let apart = line.replace('\t', "  ");
-    let apart: Vec<String> =
-        apart.split("  ").map(|w| w.trim().to_string()).filter(|w| !w.is_empty()).collect();
+    let apart: Vec<_> = apart.split("  ").map(|w| w.trim().to_string()).filter(|w| !w.is_empty()).collect();
     if apart.len() == usual {
         return apart;
     }
