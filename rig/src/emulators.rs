@@ -7,6 +7,7 @@ use drivers::socketcan::KernelCan;
 use drivers::vibrometer::VibrometerSetup;
 use drivers::{InstrumentSetup, InstrumentsSetup};
 use instruments::{LinkKind, Profile};
+use miette::{IntoDiagnostic, bail, miette};
 use serialport::{SerialPort, TTYPort};
 use sim::wire::can::{CanDevice, CanEmulator, EmulatedAdapter};
 use sim::wire::device::Device;
@@ -44,7 +45,7 @@ pub fn serve(
     setup: &mut InstrumentsSetup,
     plant: &SharedPlant,
     everywhere: bool,
-) -> Result<Emulators, String> {
+) -> miette::Result<Emulators> {
     if let Some(weight) = setup.stage.dead_weight_n {
         plant.now().0.command(&[(Command::NormalForce, weight)]);
     }
@@ -71,9 +72,9 @@ struct Serving<'a> {
 
 impl Serving<'_> {
     /// Serves an instrument that has its place for itself; another one is put to those of its place.
-    fn one(&mut self, instrument: &mut InstrumentSetup) -> Result<(), String> {
+    fn one(&mut self, instrument: &mut InstrumentSetup) -> miette::Result<()> {
         let (plant, everywhere, emulators) = (self.plant, self.everywhere, &mut self.emulators);
-        let mut profile = instrument.description().map_err(|error| error.to_string())?;
+        let mut profile = instrument.description().into_diagnostic()?;
         if let Some(rate) = instrument.rate_hz {
             // What comes by itself comes as often as the setup expects it.
             let unasked = profile.description.message.iter_mut().filter(|message| message.request.is_none());
@@ -81,9 +82,9 @@ impl Serving<'_> {
         }
         let link = profile.description.link.clone();
         let device = mounted(profile, instrument)?;
-        let failed = |error: std::io::Error| format!("{} cannot be served: {error}", instrument.profile);
+        let failed = |error: std::io::Error| miette!("{} cannot be served: {error}", instrument.profile);
         let twice = |of: &str, unit: u8| {
-            format!("two instruments {of} have Modbus unit {unit}; give one another `unit`")
+            miette!(help = "give one of them another `unit`", "two instruments {of} have Modbus unit {unit}")
         };
         match link.kind {
             LinkKind::ModbusTcp if !instrument.address.starts_with("rtu:") => {
@@ -150,11 +151,11 @@ impl Serving<'_> {
     }
 
     /// Serves the shared places with all their instruments.
-    fn shared(self, all: &mut [&mut InstrumentSetup]) -> Result<Emulators, String> {
+    fn shared(self, all: &mut [&mut InstrumentSetup]) -> miette::Result<Emulators> {
         let (plant, everywhere, mut emulators) = (self.plant, self.everywhere, self.emulators);
         for (address, units) in self.registers {
             let server = ModbusTcpServer::start(socket(&address, everywhere)?, units, plant.clone())
-                .map_err(|error| format!("cannot listen on {address}: {error}"))?;
+                .map_err(|error| miette!("cannot listen on {address}: {error}"))?;
             for instrument in all.iter_mut().filter(|instrument| instrument.address == address) {
                 instrument.address = server.address().to_string();
             }
@@ -163,21 +164,21 @@ impl Serving<'_> {
         }
         for (mut address, units) in self.lines {
             let port = port(&mut address)?;
-            let failed = |error: std::io::Error| format!("{address} cannot be served: {error}");
+            let failed = |error: std::io::Error| miette!("{address} cannot be served: {error}");
             emulators.add(SerialEmulator::modbus_rtu(port, units, plant.clone()).map_err(failed)?);
         }
         for (interface, devices) in self.buses {
-            let bus = KernelCan::open(&interface).map_err(|error| error.to_string())?;
+            let bus = KernelCan::open(&interface).into_diagnostic()?;
             let emulator = CanEmulator::start(bus, devices, plant.clone());
-            emulators.add(emulator.map_err(|error| error.to_string())?);
+            emulators.add(emulator.into_diagnostic()?);
         }
         Ok(emulators)
     }
 }
 
 /// An emulated instrument as it is mounted: a force sensor shows the axes that the setup has it for.
-fn mounted(profile: Profile, instrument: &InstrumentSetup) -> Result<Device, String> {
-    let mut device = Device::new(profile).map_err(|error| error.to_string())?;
+fn mounted(profile: Profile, instrument: &InstrumentSetup) -> miette::Result<Device> {
+    let mut device = Device::new(profile).into_diagnostic()?;
     let axes = [(&instrument.lateral, Quantity::LateralForce), (&instrument.normal, Quantity::NormalForce)];
     for (axis, quantity) in axes {
         if let Some(axis) = axis {
@@ -191,40 +192,40 @@ fn mounted(profile: Profile, instrument: &InstrumentSetup) -> Result<Device, Str
 ///
 /// # Errors
 /// A line that cannot be served, or a profile that names what the world does not have.
-pub fn vibrometer(setup: &mut VibrometerSetup, plant: &SharedPlant) -> Result<SerialEmulator, String> {
-    let profile = setup.description().map_err(|error| error.to_string())?;
-    let device = Device::new(profile).map_err(|error| error.to_string())?;
+pub fn vibrometer(setup: &mut VibrometerSetup, plant: &SharedPlant) -> miette::Result<SerialEmulator> {
+    let profile = setup.description().into_diagnostic()?;
+    let device = Device::new(profile).into_diagnostic()?;
     let port = port(&mut setup.address)?;
     SerialEmulator::lines(port, LineInstrument::new(device, plant.clone()), || None)
-        .map_err(|error| format!("{} cannot be served: {error}", setup.profile))
+        .map_err(|error| miette!("{} cannot be served: {error}", setup.profile))
 }
 
 /// A loopback address, unless other machines are to be served.
-fn socket(address: &str, everywhere: bool) -> Result<SocketAddr, String> {
+fn socket(address: &str, everywhere: bool) -> miette::Result<SocketAddr> {
     let address: SocketAddr = address
         .parse()
-        .map_err(|_| format!("`{address}`: the virtual rig needs an address like 127.0.0.1:0"))?;
+        .map_err(|_| miette!("`{address}`: the virtual rig needs an address like 127.0.0.1:0"))?;
     if everywhere || address.ip().is_loopback() {
         Ok(address)
     } else {
-        Err(format!("the virtual rig listens on loopback only, not on {address}"))
+        Err(miette!("the virtual rig listens on loopback only, not on {address}"))
     }
 }
 
 /// The emulator's end of a serial line: `pty` makes one and puts its path into the address, another
 /// path is opened.
-fn port(address: &mut String) -> Result<Box<dyn SerialPort>, String> {
+fn port(address: &mut String) -> miette::Result<Box<dyn SerialPort>> {
     let (scheme, path) = match address.split_once(':') {
         Some((scheme, path)) => (format!("{scheme}:"), path.to_string()),
         None => (String::new(), address.clone()),
     };
     if path == "pty" {
-        let (master, slave) = TTYPort::pair().map_err(|error| format!("no pseudo-terminal: {error}"))?;
-        let name = slave.name().ok_or("a pseudo-terminal without a name")?;
+        let (master, slave) = TTYPort::pair().map_err(|error| miette!("no pseudo-terminal: {error}"))?;
+        let name = slave.name().ok_or_else(|| miette!("a pseudo-terminal without a name"))?;
         *address = format!("{scheme}{name}");
         return Ok(Box::new(master));
     }
-    serialport::new(&path, 115_200).open().map_err(|error| format!("{path}: {error}"))
+    serialport::new(&path, 115_200).open().map_err(|error| miette!("{path}: {error}"))
 }
 
 /// Emulators of a setup's instruments by Modbus unit, for a virtual rig behind Modbus TCP.
@@ -234,16 +235,15 @@ fn port(address: &mut String) -> Result<Box<dyn SerialPort>, String> {
 pub fn emulators(setup: &InstrumentsSetup) -> miette::Result<BTreeMap<u8, Device>> {
     let mut devices = BTreeMap::new();
     for instrument in setup.all() {
-        let profile = instrument.description().map_err(|e| miette::miette!("{e}"))?;
+        let profile = instrument.description().into_diagnostic()?;
         if !matches!(profile.description.link.kind, LinkKind::ModbusTcp | LinkKind::ModbusRtu) {
             continue;
         }
         let unit = instrument.unit.or(profile.description.link.unit).unwrap_or(1);
-        let device =
-            mounted(profile, instrument).map_err(|e| miette::miette!("{}: {e}", instrument.profile))?;
+        let device = mounted(profile, instrument).map_err(|e| miette!("{}: {e}", instrument.profile))?;
         let other = |served: &Device| served.profile().id() != instrument.profile;
         if devices.insert(unit, device).is_some_and(|served| other(&served)) {
-            miette::bail!(
+            bail!(
                 help = "give one of them another `unit`",
                 "two instruments of the virtual rig have Modbus unit {unit}"
             );

@@ -50,13 +50,13 @@ pub enum CtrlC {
 /// # Errors
 /// The standard input is not a terminal, or the program is not in its foreground: it would be stopped by the
 /// first look at a key.
-pub fn has_keys() -> Result<(), String> {
+pub fn has_keys() -> io::Result<()> {
     if !isatty(stdin()) {
-        return Err("the standard input is not a terminal, so no key can be pressed".into());
+        return Err(io::Error::other("the standard input is not a terminal, so no key can be pressed"));
     }
-    let foreground = tcgetpgrp(stdin()).map_err(|e| e.to_string())?;
+    let foreground = tcgetpgrp(stdin())?;
     if foreground != rustix::process::getpgrp() {
-        return Err("the program runs in the background of its terminal".into());
+        return Err(io::Error::other("the program runs in the background of its terminal"));
     }
     Ok(())
 }
@@ -66,9 +66,9 @@ pub fn has_keys() -> Result<(), String> {
 ///
 /// # Errors
 /// As [`has_keys`].
-pub fn listen(ctrl_c: CtrlC) -> Result<(), String> {
+pub fn listen(ctrl_c: CtrlC) -> io::Result<()> {
     has_keys()?;
-    let before = tcgetattr(stdin()).map_err(|e| e.to_string())?;
+    let before = tcgetattr(stdin())?;
     let mut listening = before.clone();
     listening.local_modes.remove(LocalModes::ICANON | LocalModes::ECHO);
     for code in [SpecialCodeIndex::VSUSP, SpecialCodeIndex::VQUIT] {
@@ -80,9 +80,9 @@ pub fn listen(ctrl_c: CtrlC) -> Result<(), String> {
     listening.special_codes[SpecialCodeIndex::VMIN] = 1;
     listening.special_codes[SpecialCodeIndex::VTIME] = 0;
     *BEFORE.lock().unwrap_or_else(PoisonError::into_inner) = Some(before);
-    tcsetattr(stdin(), OptionalActions::Flush, &listening).map_err(|e| {
+    tcsetattr(stdin(), OptionalActions::Flush, &listening).map_err(|why| {
         give_back();
-        e.to_string()
+        why.into()
     })
 }
 
@@ -111,9 +111,9 @@ pub fn keys(into: &mut [u8]) -> io::Result<usize> {
 ///
 /// # Errors
 /// The standard output is not a terminal.
-pub fn show() -> Result<(), String> {
+pub fn show() -> io::Result<()> {
     if !isatty(stdout()) {
-        return Err("the standard output is not a terminal".into());
+        return Err(io::Error::other("the standard output is not a terminal"));
     }
     PANICS.call_once(|| {
         let usual = std::panic::take_hook();

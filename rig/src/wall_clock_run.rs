@@ -180,7 +180,7 @@ fn connect(job: &Job, sweep: &Sweep, answers: OperatorAnswers, clock: &Clock) ->
         // The real places are put into the setup's.
         let plant = SharedPlant::new(sim::wire::world::WorldPlant::new(job.world()?), clock.clone());
         let served = crate::emulators::serve(&mut instruments, &plant, false);
-        emulators = Some((served.map_err(|problem| miette::miette!("{problem}"))?, plant));
+        emulators = Some((served?, plant));
     }
     let air = emulators.as_ref().map(|(_, plant)| SimulatedAir::Served(plant.clone()));
     let ambient_control = AmbientControl::open(sweep, instruments.chamber.as_ref(), air, answers)?;

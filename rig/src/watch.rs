@@ -107,12 +107,12 @@ impl TerminalView {
     /// # Errors
     /// No terminal, or no thread can be had.
     pub fn begin(folder: &Path, lead: Option<Signals>, dead_man: bool) -> miette::Result<Self> {
-        let refused = |why: String| miette::miette!("{why}");
         let own = lead.is_some();
         let ctrl_c = if own { CtrlC::Signal } else { CtrlC::Key };
         // The screen first: where it is refused, no keys were taken.
-        terminal::show().map_err(refused)?;
-        let listen = || terminal::listen(ctrl_c).map_or_else(Keys::None, |()| Keys::Here);
+        terminal::show().into_diagnostic()?;
+        let listen =
+            || terminal::listen(ctrl_c).map_or_else(|why| Keys::None(why.to_string()), |()| Keys::Here);
         let keys = if dead_man { Keys::DeadMan } else { listen() };
         let (view, source) = (View::default(), Source::default());
         let seen = Seen { view, source, heard: Instant::now(), note: None, help: false };

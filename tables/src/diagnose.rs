@@ -1,4 +1,5 @@
 //! From a table and the rig.toml beside it to a verdict, its page, and the files in a run's folder.
+//! `Subject::diagnose` adds the remarks that only the table and its run give: record, empty cells, law.
 
 use crate::import::{never_lifts, points, remarks_of};
 use crate::law::Loaded;

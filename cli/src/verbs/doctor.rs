@@ -110,5 +110,5 @@ fn serve(setup: &Setup, instruments: &mut drivers::InstrumentsSetup) -> miette::
     let config = setup.file.virtual_rig.clone().unwrap_or_default().world();
     let world = World::new(&config, 1).map_err(|e| miette::miette!("{e}"))?;
     let plant = SharedPlant::new(WorldPlant::new(world), Instant::now());
-    rig::emulators::serve(instruments, &plant, false).map_err(|problem| miette::miette!("{problem}"))
+    rig::emulators::serve(instruments, &plant, false)
 }

@@ -72,11 +72,9 @@ pub fn run(args: Args, json: bool) -> miette::Result<ExitCode> {
             args.modbus_tcp
         );
     }
-    let mut emulators =
-        rig::emulators::serve(&mut instruments, &plant, true).map_err(|e| miette::miette!("{e}"))?;
+    let mut emulators = rig::emulators::serve(&mut instruments, &plant, true)?;
     let mut vibrometer = setup.file.vibrometer.clone();
-    let served = vibrometer.as_mut().map(|v| rig::emulators::vibrometer(v, &plant)).transpose();
-    let served = served.map_err(|e| miette::miette!("{e}"))?;
+    let served = vibrometer.as_mut().map(|v| rig::emulators::vibrometer(v, &plant)).transpose()?;
     emulators.places.extend(vibrometer.map(|v| format!("{} at {}", v.profile, v.address)));
     let modbus_tcp = emulators.modbus_tcp.map(|address| address.to_string());
     if json {

@@ -1,4 +1,5 @@
 //! All that was fitted to a table; how probable each hypothesis is. docs/diagnosis/model.md, section 8.
+//! The searches fill `Fitted`; `weigh` alone turns evidence into probabilities; `verdict` decides from them.
 
 use crate::data::RigFile;
 use crate::hypotheses::Structure;
