@@ -73,7 +73,7 @@ fn over_instruments(
     let preamble = run_writer::preamble(&job, start_unix_ns)?;
 
     let lost = Arc::new(AtomicBool::new(false));
-    let monitor = StallMonitor::start(origin_ns).map_err(begun_fault)?;
+    let monitor = StallMonitor::start(origin_ns).map_err(fault)?;
     let ports = job.setup.certificates.applied(Ports::new(rig.force, rig.amplifier, rig.stage));
     let (rig, handle, rows) = WallClockLoop::start(Parts {
         config: job.setup.config,
@@ -83,11 +83,11 @@ fn over_instruments(
         pacing: job.setup.file.pace.pacing(),
         origin_ns,
     })
-    .map_err(begun_fault)?;
+    .map_err(fault)?;
     let keeping = ledger.map(|ledger| ledger.keep(rig.life(), handle.stopper()));
-    let keeping = keeping.transpose().map_err(begun_fault)?;
-    let held = key.map(|key| key.hold(handle.sender())).transpose().map_err(begun_fault)?;
-    let recording = Recording::start(file, preamble, rows, &lost, &clock).map_err(begun_fault)?;
+    let keeping = keeping.transpose().map_err(fault)?;
+    let held = key.map(|key| key.hold(handle.sender())).transpose().map_err(fault)?;
+    let recording = Recording::start(file, preamble, rows, &lost, &clock).map_err(fault)?;
 
     let (note_in, notes) = channel();
     let mut unsaved = None;
@@ -112,7 +112,7 @@ fn over_instruments(
             lost.store(true, Ordering::Relaxed);
             save(&mut |_| {});
         }
-        let outcome = following.map_err(|why| begun_fault(threads::refused(why)));
+        let outcome = following.map_err(|why| fault(threads::refused(why)));
         let panicked = |_| fault("the sweep's thread panicked");
         (outcome.and_then(|following| following.join().map_err(panicked)), finished.err())
     });
@@ -126,7 +126,7 @@ fn over_instruments(
         keeping.end(ended.off.read_back);
     }
     let (stalls, held_back) = (monitor.finish(), clock.held_back());
-    let written = recording.end(last_words(&outcome, &stalls, &ended).map_err(begun_fault)?);
+    let written = recording.end(last_words(&outcome, &stalls, &ended).map_err(fault)?);
     let Ended { report, links, off } = ended;
     if let Some(panic) = panicked {
         tracing::error!("{}", off.words());
@@ -275,12 +275,7 @@ fn pass_on(
     }
 }
 
-/// An error after the loop had begun: no refusal, the rig was touched.
-fn begun_fault(why: impl std::error::Error + Send + Sync + 'static) -> miette::Report {
-    miette::Report::from_err(why).wrap_err(Unfinished::Internal)
-}
-
-/// A fault of this program, after the rig was touched.
-fn fault(what: &'static str) -> miette::Report {
-    miette::miette!("{what}").wrap_err(Unfinished::Internal)
+/// A fault after the loop had begun: no refusal, the rig was touched.
+fn fault(why: impl std::fmt::Display) -> miette::Report {
+    miette::miette!("{why}").wrap_err(Unfinished::Internal)
 }

@@ -31,8 +31,7 @@ pub struct GapRegion {
 
 /// Probability by place; `unknown` is the open set's.
 pub fn ledger(fitted: &Fitted, decision: &Decision) -> BTreeMap<&'static str, f64> {
-    let mut map: BTreeMap<&'static str, f64> =
-        Location::ALL.iter().map(|place| (place.name(), 0.0)).collect();
+    let mut map: BTreeMap<_, f64> = Location::ALL.iter().map(|place| (place.name(), 0.0)).collect();
     map.insert("unknown", decision.open_set);
     for (members, p) in decision.stated(fitted) {
         for &e in members {

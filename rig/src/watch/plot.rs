@@ -33,10 +33,6 @@ impl Dots {
         }
     }
 
-    fn is_set(&self, x: usize, y: usize) -> bool {
-        self.set[y * self.size()[0] + x]
-    }
-
     /// What a cell looks like.
     fn sign(&self, cx: usize, cy: usize, unicode: bool) -> char {
         // The bits of braille by column and row.
@@ -44,7 +40,7 @@ impl Dots {
         let (mut code, mut upper, mut lower) = (0, false, false);
         for x in 0..DOTS[0] {
             for y in 0..DOTS[1] {
-                if self.is_set(cx * DOTS[0] + x, cy * DOTS[1] + y) {
+                if self.set[(cy * DOTS[1] + y) * self.size()[0] + cx * DOTS[0] + x] {
                     code |= BITS[x][y];
                     upper |= y < 2;
                     lower |= y >= 2;

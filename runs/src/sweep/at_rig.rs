@@ -168,11 +168,6 @@ impl AtRig {
         self.found[at].filter(|f| self.by_hand(at) || typed(f) || now.since(f.at).seconds() <= STALE_S)
     }
 
-    /// Whether a quantity is where the pass wants it.
-    fn is_there(&self, at: usize, wanted: f64, now: Nanos) -> bool {
-        self.level[at] == Some(wanted) && self.within(at, wanted, now)
-    }
-
     fn within(&self, at: usize, wanted: f64, now: Nanos) -> bool {
         self.reading(at, now).is_some_and(|f| (f.value - wanted).abs() <= self.tolerance[at])
     }
@@ -184,7 +179,7 @@ impl AtRig {
         let mut changes = false;
         for (at, (covariate, _)) in AIR.iter().enumerate() {
             let Some(wanted) = covariate.of(condition).filter(|_| self.means[at].is_some()) else { continue };
-            if !self.is_there(at, wanted, now) {
+            if self.level[at] != Some(wanted) || !self.within(at, wanted, now) {
                 changes |= self.level[at].is_some_and(|before| before != wanted);
                 tasks.push_back(Task::Level(at, wanted));
             }

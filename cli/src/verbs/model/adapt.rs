@@ -8,7 +8,7 @@ use serde_json::Value;
 use std::collections::BTreeMap;
 use studies::cases::adaptive::{SparseGrid, place_of};
 use studies::cases::file::Header;
-use studies::cases::kinds::{Cell, ridge};
+use studies::cases::kinds::{Cell, ridge, ridge::RidgeSettings};
 use studies::cases::run::Entry;
 use studies::cases::submit::{Options, checked, whole};
 
@@ -78,8 +78,7 @@ pub fn run(args: &AdaptArgs, json: bool) -> miette::Result<ExitCode> {
     let steady = Steady { tolerance: args.tolerance, at_most: args.at_most, ..Steady::default() };
     let header = |spans: BTreeMap<String, ridge::ValueRange>, cases: u64| {
         let (elements, base) = (args.elements, base.clone());
-        let settings =
-            ridge::RidgeSettings { elements, steady, base, spans, first: HELD_OUT_FROM, case: None };
+        let settings = RidgeSettings { elements, steady, base, spans, first: HELD_OUT_FROM, case: None };
         settings.check_spans()?;
         Header::of(&ridge::KIND, &settings, cases)
     };

@@ -14,7 +14,7 @@ use models::covariate::{self, Covariate};
 use models::psi::{PsiEq17, relative_friction, within_fitted_range};
 use models::{Condition, PeakToPeak};
 use plotters::prelude::*;
-use std::collections::BTreeMap;
+use std::collections::{BTreeMap, BTreeSet};
 
 const PLACES: u32 = 120;
 
@@ -78,8 +78,7 @@ fn along<'a>(driven: &[(&'a MeasuredPass, Condition)], k: usize) -> Vec<(&'a Mea
         groups.entry(others.collect()).or_default().push((*pass, *c));
     }
     let settings = |group: &Vec<(&MeasuredPass, Condition)>| {
-        let along: std::collections::BTreeSet<_> =
-            group.iter().map(|(_, c)| levels[k].index(AXES[k].of(c))).collect();
+        let along: BTreeSet<_> = group.iter().map(|(_, c)| levels[k].index(AXES[k].of(c))).collect();
         (along.len(), group.len())
     };
     groups.into_values().max_by_key(settings).unwrap_or_default()
